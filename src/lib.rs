@@ -24,7 +24,7 @@
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, observation, robot, spatial |
-//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, robot, spatial |
+//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, estimate, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
 //! | [`diff`] | two tables or two runs compared | raw, store |

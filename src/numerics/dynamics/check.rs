@@ -105,8 +105,8 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
         faults.push(fault("points", format!("{far:.0} m from the base: lengths are in m (millimetres?)")));
     }
     let ranges: Vec<f64> = (0..n).map(|joint| range(recording, joint)).collect();
-    for joint in 0..n {
-        faults.extend(joint_faults(arm, recording, joint, ranges[joint]));
+    for (joint, range) in ranges.iter().enumerate() {
+        faults.extend(joint_faults(arm, recording, joint, *range));
     }
     let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
@@ -208,7 +208,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
         let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
-        if own > UNIT_RATIO || own < 1.0 / UNIT_RATIO {
+        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&own) {
             faults.push(fault(
                 "torque",
                 format!("torques are {own:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or torque constant is wrong (by 1,000?)", heaviest + 1),

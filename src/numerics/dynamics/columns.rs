@@ -54,8 +54,18 @@ impl TorqueColumns {
 
     /// Takes another form; its number.
     pub fn push(&mut self, form: TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> usize {
+        let known = self.forms.iter().position(|known| {
+            form.cause.is_alike_at_joints() && known.cause.name() == form.cause.name() && known.with == form.with
+        });
+        let columns = match known {
+            Some(known) => {
+                let here = |column: &TorqueColumn| TorqueColumn { joints: vec![form.joint()], ..column.clone() };
+                self.columns[self.of(known)].iter().map(here).collect()
+            }
+            None => columns_of(&form, scene, reduction, regressor),
+        };
         self.first.push(self.columns.len());
-        self.columns.extend(columns_of(&form, scene, reduction, regressor));
+        self.columns.extend(columns);
         self.forms.push(form);
         self.forms.len() - 1
     }

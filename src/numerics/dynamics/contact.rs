@@ -11,8 +11,8 @@ const AVERAGED: f64 = 0.8;
 /// Events of a recording, at most.
 const MOST: usize = 4;
 /// Median absolute deviations above the median, and times the median, at which a time is looked at.
-const DEVIATIONS: f64 = 8.0;
-const TIMES_USUAL: f64 = 3.0;
+const DEVIATIONS: f64 = 6.0;
+const TIMES_USUAL: f64 = 1.7;
 /// s that are tried.
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// s beside the highest point that are tried as middles: steps on either side, and their length.
@@ -25,15 +25,29 @@ const FINE_STEPS: i32 = 3;
 const FEWEST: usize = 4;
 /// s on either side of an event where no other is looked for.
 const APART: f64 = 1.6;
-/// What a force must gain, and which share of the residual it must explain.
-const GAIN: f64 = 150.0;
+/// What a force must gain, and which share it must explain of what stands above the noise.
+const GAIN: f64 = 100.0;
 const SHARE: f64 = 0.6;
+/// The same beside a rich model, which takes part of it away: there rows are only set aside.
+const RICH_SHARE: f64 = 0.35;
+/// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
+const OTHERS: f64 = 0.1;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
 
-/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time; only fitted rows are
-/// looked at where the residual is of a model too rich for others.
-pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], fitted_only: bool) -> Vec<ContactEvent> {
+/// What a residual is left by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beside {
+    /// A model too rich for rows that it was not fitted to.
+    RichModel,
+    /// A model that is still searched for: held-out rows are not looked at.
+    PresentModel,
+    /// The model that stands.
+    JudgedModel,
+}
+
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time.
+pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], beside: Beside) -> Vec<ContactEvent> {
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
@@ -41,12 +55,13 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
             residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
         })
         .collect();
-    let shown: Vec<usize> = (0..rows).filter(|row| !fitted_only || !problem.is_held_out(*row)).collect();
+    let shown: Vec<usize> = (0..rows).filter(|row| beside == Beside::JudgedModel || !problem.is_held_out(*row)).collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
+    let least_share = if beside == Beside::RichModel { RICH_SHARE } else { SHARE };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..MOST {
         let free = (0..shown.len()).filter(|row| !used[*row]);
@@ -54,7 +69,7 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
         if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
             break;
         }
-        let found = best_window(problem, residual, sigma, &time, time[shown[highest]]);
+        let found = best_window(problem, residual, sigma, &time, time[shown[highest]], least_share);
         events.extend(found.filter(|event| moves(problem, &time, event)));
         let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
         (0..shown.len()).filter(near).for_each(|row| used[row] = true);
@@ -64,7 +79,14 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
 }
 
 /// The window about `middle` in which a force gains most, if it explains the residual there.
-fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], time: &[f64], middle: f64) -> Option<ContactEvent> {
+fn best_window(
+    problem: &TorqueProblem,
+    residual: &[Vec<f64>],
+    sigma: &[f64],
+    time: &[f64],
+    middle: f64,
+    least_share: f64,
+) -> Option<ContactEvent> {
     let mut best: Option<(ContactEvent, f64)> = None;
     let mut look = |start: f64, duration: f64| {
         let first = time.partition_point(|time| *time < start);
@@ -90,10 +112,10 @@ fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], ti
             now = look(start + begin, duration + end - begin);
         }
     }
-    best.filter(|(event, share)| event.gain > GAIN && *share > SHARE).map(|(event, _)| event)
+    best.filter(|(event, share)| event.gain > GAIN && *share > least_share).map(|(event, _)| event)
 }
 
-/// A push that rises and falls as sin^2 over a window, fitted; and the share of the squared residual that it explains.
+/// A push that rises and falls as sin^2 over a window, fitted; and the share that it explains of the squared residual above the noise.
 fn pushed(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
@@ -103,8 +125,10 @@ fn pushed(
     duration: f64,
     rows: std::ops::Range<usize>,
 ) -> (ContactEvent, f64) {
+    let usual = (rows.len() * sigma.len()) as f64;
     let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     let mut by_joint = vec![0.0; sigma.len()];
+    let mut along_force = vec![(Matrix3::zeros(), Vector3::zeros()); sigma.len()];
     for row in rows {
         let push = (PI * (time[row] - start) / duration).sin().powi(2);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
@@ -114,12 +138,16 @@ fn pushed(
             right += column * value;
             square += value * value;
             by_joint[joint] += value * value;
+            along_force[joint].0 += column * column.transpose();
+            along_force[joint].1 += column * value;
         }
     }
     let ridge = 1e-8 * gram.trace();
     let inverse = (gram + Matrix3::identity() * ridge).try_inverse().unwrap_or_else(Matrix3::zeros);
     let force = inverse * right;
-    let gain = 2.0 * force.dot(&right) - force.dot(&(gram * force));
+    let gained = |(gram, right): &(Matrix3<f64>, Vector3<f64>)| 2.0 * force.dot(right) - force.dot(&(gram * force));
+    let gain = gained(&(gram, right));
+    let most = along_force.iter().map(gained).fold(0.0, f64::max);
     let mut joints: Vec<usize> = (0..sigma.len()).collect();
     joints.sort_by(|a, b| by_joint[*b].total_cmp(&by_joint[*a]));
     joints.truncate(2);
@@ -131,7 +159,8 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    (event, gain / square.max(f64::MIN_POSITIVE))
+    let share = if gain - most < OTHERS * gain { 0.0 } else { gain / (square - usual).max(gain) };
+    (event, share)
 }
 
 /// Whether the arm moves in a good part of an event.

@@ -46,6 +46,11 @@ fn finding(
     let count =
         effect.iter().filter(|course| course.iter().any(|value| *value != 0.0)).count().max(1) * problem.reduction.rows.len();
     let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
+    // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
+    let left_without: Vec<(usize, f64)> = match form.cause.is_inertial() {
+        true => solution.iter().copied().filter(|(column, _)| !problem.all.of(number).contains(column)).collect(),
+        false => without.solution(),
+    };
     let mut finding = TorqueFinding {
         effect: form.cause.name(),
         place: form.place,
@@ -56,7 +61,7 @@ fn finding(
             f_statistic: loss.square / rank,
             p_value: tail(loss.square / rank, rank, FREEDOM),
             delta_bic,
-            heldout_gain: (!held_out.is_empty()).then(|| held_out_gain(problem, &without, solution, held_out)),
+            heldout_gain: (!held_out.is_empty()).then(|| held_out_gain(problem, &left_without, solution, held_out)),
             effect_rms: (square / count as f64).sqrt(),
         },
         rivals: rivals(choice, &rest, &without, number, loss.square),
@@ -78,12 +83,12 @@ fn fitted(problem: &TorqueProblem, sweep: &Sweep, solution: &[(usize, f64)], num
 }
 
 /// Fall of the rms of held-out rows, Nm, over all joints.
-fn held_out_gain(problem: &TorqueProblem, without: &Sweep, solution: &[(usize, f64)], rows: &[usize]) -> f64 {
+fn held_out_gain(problem: &TorqueProblem, without: &[(usize, f64)], solution: &[(usize, f64)], rows: &[usize]) -> f64 {
     let rms = |residual: &[Vec<f64>]| {
         let square: f64 = residual.iter().flat_map(|course| rows.iter().map(|row| course[*row].powi(2))).sum();
         (square / (rows.len() * residual.len()) as f64).sqrt()
     };
-    rms(&problem.residual(&without.solution())) - rms(&problem.residual(solution))
+    rms(&problem.residual(without)) - rms(&problem.residual(solution))
 }
 
 /// Other names or places that explain nearly as much, the best form of each; closest first.

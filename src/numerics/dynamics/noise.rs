@@ -89,12 +89,14 @@ mod tests {
                 now
             })
             .collect();
-        let noise = JointNoise::of(&course, &[0..course.len()], 0.0);
+        let whole = 0..course.len();
+        let runs = std::slice::from_ref(&whole);
+        let noise = JointNoise::of(&course, runs, 0.0);
         assert!((noise.memory[0] - 0.8).abs() < 0.03 && (noise.innovation - 1.0).abs() < 0.02, "{noise:?}");
         // (1 + 0.8) / (1 - 0.8).
         assert!((noise.autocorrelation() / 9.0 - 1.0).abs() < 0.15, "{}", noise.autocorrelation());
         let mut white = Vec::new();
-        noise.whiten(&course, &[0..course.len()], &mut white);
+        noise.whiten(&course, runs, &mut white);
         let lag = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / white.len() as f64;
         assert!(lag.abs() < 0.03, "{lag}");
     }

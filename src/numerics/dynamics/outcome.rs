@@ -1,5 +1,6 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
+use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
 use super::findings::{contact, findings, plain_finding};
@@ -19,6 +20,8 @@ use crate::error::counted;
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;
+/// Standard deviations of the mean square of noise.
+const DEVIATIONS: f64 = 3.0;
 /// Rows that count as one, from which on a residual is no noise.
 const LASTING: f64 = 8.0;
 
@@ -29,7 +32,9 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
-    let (first, last) = (problem.residual(&choice.base.solution()), problem.residual(&solution));
+    // As the arm is simulated today: as declared, else with identified masses alone.
+    let today = if problem.scene.declared.is_some() { Vec::new() } else { choice.base.solution() };
+    let (first, last) = (problem.residual(&today), problem.residual(&solution));
     let counted_rows = |held_out: bool| problem.runs(held_out).into_iter().flatten().collect::<Vec<usize>>();
     let held = counted_rows(true);
     let judging = if held.is_empty() { counted_rows(false) } else { held.clone() };
@@ -37,6 +42,7 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
     let mut found = findings(&choice, set, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
+    found.extend(nameless(&choice, &solved.judged.withdrawn, &last));
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);
@@ -75,6 +81,30 @@ fn late(latency: &super::latency::Latency) -> TorqueFinding {
     let parameter = TorqueParameter { name: "latency".into(), value: milliseconds, unit: "ms", sigma: Some(1e3 * latency.sigma) };
     let statement = format!("torques come {milliseconds:.1} ms later than the positions beside them");
     plain_finding(super::LATENCY, Place::Recording, statement, vec![parameter], latency.gain, 1.0)
+}
+
+/// Something without a name of which held-out rows confirm that it is there, though not its shape: what they leave at its joint stands
+/// above the noise.
+fn nameless(choice: &CauseChoice, withdrawn: &[(usize, f64)], residual: &[Vec<f64>]) -> Vec<TorqueFinding> {
+    let problem = choice.problem;
+    let runs = problem.runs(true);
+    let errors = problem.weighing(&runs).measured(residual);
+    let mut found: Vec<TorqueFinding> = Vec::new();
+    for form in withdrawn.iter().map(|(number, _)| choice.form(*number)).filter(|form| form.cause.name() == UNKNOWN) {
+        let own = &errors[form.joint()];
+        let rows = own.len() as f64;
+        let above = own.iter().map(|error| error * error).sum::<f64>() / rows - 1.0;
+        if above < DEVIATIONS * (2.0 / rows).sqrt() || found.iter().any(|known| known.place == form.place) {
+            continue;
+        }
+        let statement = format!(
+            "something without a name acts at {}: held-out rows are {:.0} % further off than noise, of a shape that they do not confirm",
+            form.place,
+            100.0 * ((1.0 + above).sqrt() - 1.0)
+        );
+        found.push(plain_finding(UNKNOWN, form.place, statement, Vec::new(), above * rows, form.width as f64));
+    }
+    found
 }
 
 fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], over: f64) -> String {
@@ -117,7 +147,6 @@ fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> To
     let each = |value: &dyn Fn(usize, usize) -> f64| {
         (0..rows).flat_map(|row| (0..n).map(move |joint| value(joint, row))).collect::<Vec<f64>>()
     };
-    let declared = problem.scene.declared.is_some();
     TorqueCourses {
         row: problem.reduction.rows.clone(),
         time: problem.reduction.rows.iter().map(|row| problem.start + problem.scene.time[*row]).collect(),
@@ -126,9 +155,7 @@ fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> To
         at_rest: (0..rows).flat_map(|row| (0..n).map(move |joint| rests(problem, joint, row))).collect(),
         velocity: each(&|joint, row| problem.scene.velocity[joint][problem.reduction.rows[row]]),
         measured: each(&|joint, row| torque[joint][row]),
-        simulated: each(&|joint, row| {
-            torque[joint][row] - if declared { problem.measured[joint][row] } else { first[joint][row] }
-        }),
+        simulated: each(&|joint, row| torque[joint][row] - first[joint][row]),
         corrected: each(&|joint, row| torque[joint][row] - last[joint][row]),
     }
 }

@@ -8,6 +8,8 @@ use std::ops::Range;
 const SETTLING: f64 = 0.3;
 /// Judged rows a second over the cut-off.
 const RATE_OVER_CUTOFF: f64 = 2.5;
+/// Judged rows at most: of longer recordings fewer a second.
+const MOST: usize = 8000;
 /// Rows that a block of a long stretch holds, its margins apart.
 const BLOCK: usize = 1 << 14;
 
@@ -31,7 +33,8 @@ pub(super) struct Reduction {
 impl Reduction {
     /// Of a clock and a cut-off (Hz).
     pub fn new(clock: &Clock, cutoff: f64) -> Self {
-        let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(1);
+        let recorded: usize = clock.stretches.iter().map(Range::len).sum();
+        let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(recorded.div_ceil(MOST)).max(1);
         let settling = (SETTLING * clock.rate) as usize;
         let (mut rows, mut runs) = (Vec::new(), Vec::new());
         for stretch in &clock.stretches {

@@ -19,13 +19,13 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
     for width in SIGN_WIDTHS {
         problem.scene.sign_width = width;
         let mut left = 0.0;
-        for joint in 0..problem.joints() {
+        for (joint, inertial) in base.iter().enumerate() {
             let scene = &problem.scene;
             let signs = scene.velocity[joint].iter().map(|velocity| scene.sign(*velocity)).collect::<Vec<f64>>();
             let courses = [scene.velocity[joint].clone(), signs, vec![1.0; scene.rows()]];
             let reduced = courses.map(|mut course| problem.reduction.reduce(&mut course, &mut room));
             let friction = reduced.iter().map(|course| rows.iter().map(|row| course[*row]).collect::<Vec<f64>>());
-            let columns: Vec<Vec<f64>> = base[joint].iter().cloned().chain(friction).collect();
+            let columns: Vec<Vec<f64>> = inertial.iter().cloned().chain(friction).collect();
             let measured: Vec<f64> = rows.iter().map(|row| problem.measured[joint][*row]).collect();
             left += mean_square_left(&columns, &measured).ln();
         }

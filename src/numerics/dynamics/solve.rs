@@ -3,7 +3,7 @@
 use super::arm::DynamicArm;
 use super::choice::{CauseChoice, backward};
 use super::clock::Clock;
-use super::contact::contacts;
+use super::contact::{Beside, contacts};
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
@@ -14,11 +14,14 @@ use super::refine::refine;
 use super::rich::{noise_beside, rich_forms};
 use super::search::search;
 use super::sign_width::sign_width;
-use super::types::TorqueQuestion;
+use super::sweep::Sweep;
+use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
 
 /// Forms without a name that are looked for, at most.
 const NAMELESS: usize = 4;
+/// s.
+const SAME_TIME: f64 = 0.1;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {
@@ -46,14 +49,17 @@ pub(super) fn solve<'a>(
         problem.shift(latency.seconds);
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
-    problem.events = contacts(&problem, &residual, &sigmas(&noise), true);
+    problem.events = contacts(&problem, &residual, &sigmas(&noise), Beside::RichModel);
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
-    let mut set = {
-        let choice = CauseChoice::new(&problem, &weighted, question.seed);
-        let common = choice.common();
-        search(&choice, common)
-    };
+    let mut set = from_common(&problem, &weighted, question.seed);
+    let before = std::mem::take(&mut problem.events);
+    look_for_contacts(&mut problem, &weighted, &set, Beside::PresentModel);
+    if !alike(&before, &problem.events) {
+        learn(&mut problem, &[]);
+        weighted = problem.weighted();
+        set = from_common(&problem, &weighted, question.seed);
+    }
     tell(told(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     for _ in 0..NAMELESS {
@@ -63,12 +69,30 @@ pub(super) fn solve<'a>(
         set.push(form);
         tell(told(&problem, &set));
     }
-    let residual = problem.residual(&CauseChoice::new(&problem, &weighted, question.seed).base.with(&set).solution());
-    problem.events = contacts(&problem, &residual, &sigmas(&problem.noise), false);
+    look_for_contacts(&mut problem, &weighted, &set, Beside::JudgedModel);
     learn(&mut problem, &set);
     weighted = problem.weighted();
     let judged = judge(&CauseChoice::new(&problem, &weighted, question.seed), set);
     SolvedTorques { problem, weighted, judged, latency: found }
+}
+
+/// Searches from what hardly an arm is without.
+fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -> Vec<usize> {
+    let choice = CauseChoice::new(problem, weighted, seed);
+    search(&choice, choice.common())
+}
+
+/// Sets rows aside in which the residual of a set looks like a push.
+fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: Beside) {
+    let solution = Sweep::base(&problem.all, weighted).with(set).solution();
+    problem.events = contacts(problem, &problem.residual(&solution), &sigmas(&problem.noise), beside);
+}
+
+/// Whether the same rows are set aside, to a tenth of a second.
+fn alike(before: &[ContactEvent], after: &[ContactEvent]) -> bool {
+    let near =
+        |(a, b): (&ContactEvent, &ContactEvent)| (a.start - b.start).abs() < SAME_TIME && (a.end - b.end).abs() < SAME_TIME;
+    before.len() == after.len() && before.iter().zip(after).all(near)
 }
 
 /// From the fitted rigid torque and noise: searches on from a set and refines it.

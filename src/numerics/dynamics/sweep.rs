@@ -167,8 +167,8 @@ impl<'a> Sweep<'a> {
                 }
                 half[i] /= self.rows[i][self.pivots[i]];
                 let value = half[i];
-                for m in i + 1..count {
-                    half[m] -= value * self.rows[i][self.pivots[m]];
+                for (entry, pivot) in half.iter_mut().zip(&self.pivots).skip(i + 1) {
+                    *entry -= value * self.rows[i][*pivot];
                 }
             }
         }

@@ -4,7 +4,7 @@ use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
 
 /// How a recording of torques is to be diagnosed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct TorqueQuestion {
     /// Whether masses are identified without regard to what is declared.
     pub free_inertials: bool,
@@ -14,12 +14,6 @@ pub struct TorqueQuestion {
     pub without: Vec<String>,
     /// Of the bootstrap.
     pub seed: u64,
-}
-
-impl Default for TorqueQuestion {
-    fn default() -> Self {
-        Self { free_inertials: false, cutoff: None, without: Vec::new(), seed: 0 }
-    }
 }
 
 /// What the simulated torques rest on.
@@ -79,7 +73,8 @@ pub struct TorqueEvidence {
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
-    /// Fall of the rms of held-out rows over all joints that it acts on, Nm; `None` where none are held out or the rows lie in an event.
+    /// Fall of the rms of held-out rows over all joints, Nm, when what is left is fitted again (left as it is for wrong masses, for which
+    /// tolerances would bend); `None` where none are held out.
     pub heldout_gain: Option<f64>,
     /// Rms of the whole effect over the recording, Nm.
     pub effect_rms: f64,
@@ -215,7 +210,8 @@ pub struct TorqueDiagnosis {
     pub rate: f64,
     /// Per joint.
     pub noise: Vec<TorqueNoise>,
-    /// Of held-out rows (of the fitted ones where none are held out), with inertials alone.
+    /// Of held-out rows (of the fitted ones where none are held out), of the arm as declared (with identified masses alone where nothing is
+    /// declared).
     pub before: TorqueErrors,
     /// The same with the findings.
     pub after: TorqueErrors,

@@ -31,9 +31,10 @@ pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &Sweep)
             sentences.push(format!("joint {name}: it moves at one speed only; viscous and Coulomb friction are one there"));
         }
     }
-    for number in (0..choice.open).filter(|number| !set.contains(number)) {
+    for number in 0..choice.open {
         let form = choice.form(number);
-        if form.width == 1 && form.cause.is_inertial() && is_unseen(choice, sweep, number) {
+        let found = set.iter().any(|other| choice.form(*other).is_called_as(form));
+        if !found && form.width == 1 && form.cause.is_inertial() && is_unseen(choice, sweep, number) {
             sentences.push(format!("{} {}: these motions do not show it", form.place, form.cause.name().replace('_', " ")));
         }
     }

@@ -32,6 +32,7 @@ use crate::effect::Place;
 pub(super) use coulomb::COULOMB;
 pub(super) use offset::OFFSET;
 pub(super) use rotor::ROTOR;
+pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
 
 /// All causes with columns; latency and contacts are looked for before.
@@ -105,6 +106,10 @@ pub(super) trait TorqueCause: Sync {
     }
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     fn is_inertial(&self) -> bool {
+        false
+    }
+    /// Whether its columns are the same at whatever joint it acts.
+    fn is_alike_at_joints(&self) -> bool {
         false
     }
     /// Whether its columns are made of the rigid torque.

@@ -40,6 +40,11 @@ impl TorqueCause for Ripple {
         forms
     }
 
+    /// As common as other causes, over all orders together.
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        6.0 + 2.0 * ((ORDERS + MOTOR_ORDERS) as f64).ln()
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[1] == 0 && form.with[0] <= USUAL
     }

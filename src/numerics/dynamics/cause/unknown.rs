@@ -32,6 +32,10 @@ impl TorqueCause for Unnamed {
         30.0
     }
 
+    fn is_alike_at_joints(&self) -> bool {
+        true
+    }
+
     fn may_repeat(&self) -> bool {
         true
     }

@@ -23,7 +23,7 @@ impl TorqueCause for Warmup {
         let longest = LONGEST * scene.duration();
         let times: Vec<f64> = TIMES.into_iter().filter(|time| *time <= longest).collect();
         // The longest time serves the rich model; the second number marks it.
-        let rich = times.iter().copied().filter(|time| *time <= USUAL.max(longest / 3.0)).next_back();
+        let rich = times.iter().copied().rfind(|time| *time <= USUAL.max(longest / 3.0));
         let of = |joint| {
             let form = move |time: &f64| {
                 TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, f64::from(u8::from(Some(*time) == rich)), longest])
