@@ -54,7 +54,7 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
     TorqueDiagnosis {
         verdict,
         statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
-        remarks,
+        remarks: remarks.into_iter().chain([said_of_filters(problem)]).collect(),
         basis: match problem.scene.declared {
             Some(_) => InertialBasis::Declared,
             None => InertialBasis::Free(problem.all.base),
@@ -74,6 +74,14 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
         inertials: inertials(problem, set, &sweep, &solution),
         friction: friction_curves(problem, set, &sweep),
     }
+}
+
+/// How rows came about.
+fn said_of_filters(problem: &TorqueProblem) -> String {
+    format!(
+        "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s",
+        problem.reduction.cutoff, problem.reduction.rate, problem.scene.sign_width
+    )
 }
 
 fn late(latency: &super::latency::Latency) -> TorqueFinding {

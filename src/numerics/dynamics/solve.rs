@@ -43,18 +43,24 @@ pub(super) fn solve<'a>(
     let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
     problem.scene.sign_width = sign_width(&mut problem);
     problem.form(&question.without);
-    let found = latency(&problem).filter(|_| !question.without.iter().any(|name| name == super::LATENCY));
+    let asked = |name: &str| question.without.iter().all(|without| without != name);
+    let found = latency(&problem).filter(|_| asked(super::LATENCY));
+    let touched = asked(super::CONTACT);
     if let Some(latency) = &found {
         tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
         problem.shift(latency.seconds);
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
-    problem.events = contacts(&problem, &residual, &sigmas(&noise), Beside::RichModel);
+    if touched {
+        problem.events = contacts(&problem, &residual, &sigmas(&noise), Beside::RichModel);
+    }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
     let mut set = from_common(&problem, &weighted, question.seed);
-    let before = std::mem::take(&mut problem.events);
-    look_for_contacts(&mut problem, &weighted, &set, Beside::PresentModel);
+    let before = problem.events.clone();
+    if touched {
+        look_for_contacts(&mut problem, &weighted, &set, Beside::PresentModel);
+    }
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
         weighted = problem.weighted();
@@ -69,10 +75,19 @@ pub(super) fn solve<'a>(
         set.push(form);
         tell(told(&problem, &set));
     }
-    look_for_contacts(&mut problem, &weighted, &set, Beside::JudgedModel);
+    if touched {
+        look_for_contacts(&mut problem, &weighted, &set, Beside::JudgedModel);
+    }
     learn(&mut problem, &set);
     weighted = problem.weighted();
-    let judged = judge(&CauseChoice::new(&problem, &weighted, question.seed), set);
+    let judged = {
+        let choice = CauseChoice::new(&problem, &weighted, question.seed);
+        backward(&choice, &mut set);
+        let mut judged = judge(&choice, set);
+        // What only stood for something that was withdrawn.
+        backward(&choice, &mut judged.set);
+        judged
+    };
     SolvedTorques { problem, weighted, judged, latency: found }
 }
 

@@ -13,7 +13,8 @@ impl TorqueCause for TorqueConstant {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint(&TorqueConstant, scene, 1)
+        // Beside identified masses it is a part of them.
+        if scene.declared.is_some() { at_each_joint(&TorqueConstant, scene, 1) } else { Vec::new() }
     }
 
     fn price(&self, _form: &TorqueForm) -> f64 {

@@ -4,7 +4,7 @@ use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, 
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// exp(-t / T) times velocity and its sign.
+/// exp(-t / T) times velocity and its sign; shape: T and the longest of it, `with` marks the form that stands in the rich model.
 pub(super) struct Warmup;
 
 /// s.
@@ -22,11 +22,11 @@ impl TorqueCause for Warmup {
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let longest = LONGEST * scene.duration();
         let times: Vec<f64> = TIMES.into_iter().filter(|time| *time <= longest).collect();
-        // The longest time serves the rich model; the second number marks it.
         let rich = times.iter().copied().rfind(|time| *time <= USUAL.max(longest / 3.0));
         let of = |joint| {
             let form = move |time: &f64| {
-                TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, f64::from(u8::from(Some(*time) == rich)), longest])
+                let with = [usize::from(Some(*time) == rich), 0];
+                TorqueForm { with, ..TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, longest]) }
             };
             times.iter().map(form).collect::<Vec<_>>()
         };
@@ -38,11 +38,11 @@ impl TorqueCause for Warmup {
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
-        form.shape[1] == 1.0
+        form.with[0] == 1
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 1.0, most: form.shape[2], by_ratio: true }]
+        vec![ShapeSpan { index: 0, least: 1.0, most: form.shape[1], by_ratio: true }]
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {

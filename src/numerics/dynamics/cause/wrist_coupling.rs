@@ -3,9 +3,9 @@
 use super::{Fitted, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
-use crate::effect::Place;
 
-/// x = v + k v_by, and its sign, at the joint and k times that at the other; `with` holds the other joint.
+/// x = v + k v_by, and its sign, at the joint and k times that at the other; `with` holds the other joint, and
+/// whether both are known or likely to share a gear.
 pub(super) struct WristCoupling;
 
 /// k of neighbouring joints of a wrist; of other pairs only gears of one to one are tried.
@@ -32,8 +32,8 @@ impl TorqueCause for WristCoupling {
                     continue;
                 }
                 for ratio in ratios {
-                    let form = TorqueForm::at_joint(&WristCoupling, moved, 2).shaped(&[*ratio, f64::from(u8::from(near))]);
-                    forms.push(TorqueForm { place: Place::Joint(moved), with: [by, 0], ..form });
+                    let form = TorqueForm::at_joint(&WristCoupling, moved, 2).shaped(&[*ratio]);
+                    forms.push(TorqueForm { with: [by, usize::from(near)], ..form });
                 }
             }
         }
@@ -41,7 +41,7 @@ impl TorqueCause for WristCoupling {
     }
 
     fn price(&self, form: &TorqueForm) -> f64 {
-        if form.shape[1] == 1.0 { 6.0 } else { 30.0 }
+        if form.with[1] == 1 { 6.0 } else { 30.0 }
     }
 
     fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
@@ -49,7 +49,7 @@ impl TorqueCause for WristCoupling {
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
-        form.shape[1] == 1.0 && USUAL.contains(&form.shape[0])
+        form.with[1] == 1 && USUAL.contains(&form.shape[0])
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
