@@ -72,7 +72,10 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         let own = plan.stages.iter().enumerate().filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
         let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
         let Some((at, id)) = the_stage(&file, &own, arguments.step.as_deref())? else {
-            return Err(Error::spec(file, "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`"));
+            return Err(Error::spec(
+                file,
+                "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`",
+            ));
         };
         let id = id.to_string();
         let plan = plan.needed_for(at);

@@ -139,7 +139,13 @@ fn findings(tables: &TorqueTables) -> Vec<FindingView> {
         let rivals = rivals.map(|rival| format!("{} at {} {}", rival.effect, rival.place, fixed(rival.probability, 2)));
         FindingView {
             statement: row.statement.clone(),
-            probability: format!("{} {}, at {} {}", row.effect, fixed(row.probability, 2), row.place, fixed(row.place_probability, 2)),
+            probability: format!(
+                "{} {}, at {} {}",
+                row.effect,
+                fixed(row.probability, 2),
+                row.place,
+                fixed(row.place_probability, 2)
+            ),
             numbers: numbers.collect::<Vec<_>>().join(", "),
             rivals: rivals.collect::<Vec<_>>().join(", "),
         }
@@ -170,13 +176,7 @@ fn contacts(contacts: &Contacts) -> Vec<Vec<String>> {
     let row = |row: &ContactRow| {
         let force = [(row.force_x_n, row.sigma_x_n), (row.force_y_n, row.sigma_y_n), (row.force_z_n, row.sigma_z_n)];
         let force = force.map(|(force, sigma)| format!("{} \u{b1} {}", significant(force, 3), significant(sigma, 2)));
-        vec![
-            row.event.to_string(),
-            fixed(row.start_s, 2),
-            fixed(row.end_s, 2),
-            row.joints.clone(),
-            force.join(", "),
-        ]
+        vec![row.event.to_string(), fixed(row.start_s, 2), fixed(row.end_s, 2), row.joints.clone(), force.join(", ")]
     };
     contacts.0.iter().map(row).collect()
 }
@@ -286,9 +286,7 @@ fn friction(curve: &[&FrictionCurveRow], title: &str) -> String {
     let mut svg = Svg::new(420.0, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 6);
     y.grid_y(&mut svg, area, 5);
-    let point = |row: &&FrictionCurveRow, sigmas: f64| {
-        [x.at(row.velocity_rad_s), y.at(row.torque_nm + sigmas * row.sigma_nm)]
-    };
+    let point = |row: &&FrictionCurveRow, sigmas: f64| [x.at(row.velocity_rad_s), y.at(row.torque_nm + sigmas * row.sigma_nm)];
     let upper = curve.iter().map(|row| point(row, 2.0));
     let lower = curve.iter().rev().map(|row| point(row, -2.0));
     svg.path("band s-last", &upper.chain(lower).collect::<Vec<_>>());

@@ -187,10 +187,9 @@ impl DiagnoseTorques {
                 motion.usage.iter().map(|usage| !usage.is_some_and(|usage| fitted[usize::from(usage)])).collect()
             }
             None => {
-                context.services.note(format!(
-                    "no row is labelled with its use: the last {:.0} % are held out (`hold_out`)",
-                    100.0 * LAST
-                ));
+                context
+                    .services
+                    .note(format!("no row is labelled with its use: the last {:.0} % are held out (`hold_out`)", 100.0 * LAST));
                 last(LAST)
             }
         };

@@ -44,8 +44,8 @@ pub use mapped::{
     UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
-pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 pub use noise::{InstrumentSetting, instruments};
+pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 pub use wide::WideTargets;
 
 use crate::error::{Error, Result, counted};

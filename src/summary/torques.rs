@@ -107,9 +107,10 @@ impl TorqueSummary {
         let after = errors(v.after_nrmse, |row| {
             [Some(row.after_rms_nm), Some(row.after_nrmse), row.after_moving_rms_nm, row.after_rest_rms_nm]
         });
-        let noise = self.joints.iter().map(|row| {
-            json!({ "joint": row.joint, "sigma_nm": row.noise_nm, "autocorrelation": row.autocorrelation })
-        });
+        let noise = self
+            .joints
+            .iter()
+            .map(|row| json!({ "joint": row.joint, "sigma_nm": row.noise_nm, "autocorrelation": row.autocorrelation }));
         let leftover = self.joints.iter().map(|row| {
             json!({
                 "joint": row.joint, "rms_nm": row.leftover_rms_nm, "over_noise": row.leftover_over_noise, "signature": row.signature,

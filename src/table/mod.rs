@@ -136,9 +136,7 @@ pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
 pub use torque_course::TorqueCourse;
-pub use torque_findings::{
-    TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals,
-};
+pub use torque_findings::{TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals};
 pub use torque_verdict::{TorqueVerdict, TorqueVerdictRow};
 pub use training::{Training, TrainingRow};
 pub use truth::{Truth, TruthRow};

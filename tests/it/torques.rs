@@ -83,7 +83,8 @@ fn the_practice_recordings_of_torques_are_solved() {
     let Some(folder) = shared("practice_dynamics") else { return };
     let store = tempfile::tempdir().expect("a folder");
     let mut wrong = Vec::new();
-    let mut cases: Vec<PathBuf> = std::fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("one").path()).collect();
+    let mut cases: Vec<PathBuf> =
+        std::fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("one").path()).collect();
     cases.sort();
     for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
         let told = document(case, store.path());
@@ -98,9 +99,9 @@ fn the_practice_recordings_of_torques_are_solved() {
             let findings = told["findings"].as_array().expect("findings");
             let contact = findings.iter().filter(|finding| finding["effect"] == "contact");
             let starts = contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
-            let near = starts.filter(|number| number["name"] == "start").any(|number| {
-                number["value"].as_f64().is_some_and(|start| (start - began).abs() < 0.3)
-            });
+            let near = starts
+                .filter(|number| number["name"] == "start")
+                .any(|number| number["value"].as_f64().is_some_and(|start| (start - began).abs() < 0.3));
             assert!(near, "{}: no contact starts near {began} s", case.display());
         }
     }

@@ -169,7 +169,8 @@ impl<'a> MotionRows<'a> {
             (TorqueSide::Joint, _) => Ok(1.0),
             (TorqueSide::Motor, Some(ratio)) => Ok(ratio),
             (TorqueSide::Motor, None) => {
-                let message = format!("joint {} has no reduction ratio; `torque_side: motor` needs it in the robot file", row.body);
+                let message =
+                    format!("joint {} has no reduction ratio; `torque_side: motor` needs it in the robot file", row.body);
                 Err(Error::data("with.torque_side", message))
             }
         });
@@ -374,7 +375,8 @@ impl<'a> MotionRows<'a> {
             .zip(&self.channels)
             .filter_map(|(joint, channel)| Some((joint, channel.constant()?)))
             .map(|(joint, value)| {
-                let message = format!("the {signal} of joint {joint} is {value} in each of {} rows: a dead channel", self.written);
+                let message =
+                    format!("the {signal} of joint {joint} is {value} in each of {} rows: a dead channel", self.written);
                 Fault::new(format!("table motion, {signal} of joint {joint}"), message)
             })
             .collect();

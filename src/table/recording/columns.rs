@@ -44,7 +44,13 @@ static CIRCUMSTANCES: &[DeclaredColumn] = &[
     },
     DeclaredColumn {
         shape: ColumnShape::Joints { prismatic: None },
-        ..DeclaredColumn::number("torque", &["tau{j}"], Torque, [-1e7, 1e7], "Joint torques, by a sensor or as the drive states them.")
+        ..DeclaredColumn::number(
+            "torque",
+            &["tau{j}"],
+            Torque,
+            [-1e7, 1e7],
+            "Joint torques, by a sensor or as the drive states them.",
+        )
     },
     DeclaredColumn {
         shape: ColumnShape::Joints { prismatic: None },

@@ -23,9 +23,9 @@ impl TorqueCase {
     /// truth.json (what is concealed, with numbers) and want.json (what a diagnosis is asked for).
     pub fn truth(&self) -> [TorqueFile; 2] {
         let rows = self.all();
-        let effects = self.laws.iter().zip(&self.other_form).map(|(law, other)| {
-            json!({ "effect": law.name(), "where": law.place(), "law": format!("{law:?}"), "other_form": other })
-        });
+        let effects = self.laws.iter().zip(&self.other_form).map(
+            |(law, other)| json!({ "effect": law.name(), "where": law.place(), "law": format!("{law:?}"), "other_form": other }),
+        );
         let truth = json!({
             "case": self.name, "robot": self.robot.name, "seed": self.seed, "effects": effects.collect::<Vec<_>>(),
             "noise_nm": { "white": self.white, "lasting": self.lasting },
@@ -75,9 +75,10 @@ impl TorqueCase {
         let mm = |point: [f64; 3]| point.map(|x| (x * 1e6).round() / 1e3);
         let each = |of: &dyn Fn(usize) -> Value| (0..robot.joints.len()).map(of).collect::<Vec<Value>>();
         let offset: [f64; 3] = std::array::from_fn(|k| robot.payload_centre[k] - robot.tool[k]);
-        let tolerance = robot.inertias.tolerance.map(|one| {
-            json!({ "mass_rel": one.mass, "com_mm": one.centre * 1e3, "inertia_rel": one.inertia })
-        });
+        let tolerance = robot
+            .inertias
+            .tolerance
+            .map(|one| json!({ "mass_rel": one.mass, "com_mm": one.centre * 1e3, "inertia_rel": one.inertia }));
         json!({
             "name": robot.name,
             "axes": each(&|j| json!(robot.joints[j].axis)),

@@ -90,9 +90,10 @@ impl Machine {
             }
         }
         let about = |j: usize| {
-            let beyond = loads.iter().filter(|(link, _)| *link >= j).map(|(_, load)| {
-                dot(pose.axes[j], add(load.moment, cross(minus(load.centre, pose.points[j]), load.force)))
-            });
+            let beyond = loads
+                .iter()
+                .filter(|(link, _)| *link >= j)
+                .map(|(_, load)| dot(pose.axes[j], add(load.moment, cross(minus(load.centre, pose.points[j]), load.force))));
             beyond.sum::<f64>()
         };
         (0..n).map(about).collect()

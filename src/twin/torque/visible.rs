@@ -53,9 +53,8 @@ impl TorqueCase {
             let (l, before) = (space.dot(&own, &own), square(&effects[index]));
             let law = &self.laws[index];
             let known = (law.name().to_string(), law.place());
-            let says_the_same = |rival: &&(String, String, Vec<Vec<f64>>)| {
-                space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l)
-            };
+            let says_the_same =
+                |rival: &&(String, String, Vec<Vec<f64>>)| space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l);
             let same = rivals.iter().filter(says_the_same).map(|(name, place, _)| (name.clone(), place.clone()));
             let same = same.filter(|rival| *rival != known).collect();
             Visible { l, before, same }
@@ -136,9 +135,8 @@ impl<'a> Columns<'a> {
             let inertia = (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
             add(&Law::LinkInertia { link: joint, share: 0.0 }, inertia.collect());
         }
-        let payload = |change: fn(&mut super::rigid::Body)| {
-            self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
-        };
+        let payload =
+            |change: fn(&mut super::rigid::Body)| self.of_machine(|machine| machine.payload.iter_mut().for_each(change));
         let payload: Vec<Vec<f64>> = vec![
             payload(|body| body.mass += 1.0),
             payload(|body| body.centre[0] += 0.01),

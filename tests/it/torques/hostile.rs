@@ -120,7 +120,10 @@ fn an_arm_that_hardly_moves_is_refused() {
     let still = |sheet: &mut Sheet| {
         let names = columns("q{j}_deg");
         let first: Vec<f64> = names.iter().map(|name| sheet.number(0, sheet.column(name))).collect();
-        names.iter().zip(first).for_each(|(name, first)| sheet.change(std::slice::from_ref(name), |q| first + 1e-3 * (q - first)));
+        names
+            .iter()
+            .zip(first)
+            .for_each(|(name, first)| sheet.change(std::slice::from_ref(name), |q| first + 1e-3 * (q - first)));
     };
     refused(still, &["hardly moves"]);
 }

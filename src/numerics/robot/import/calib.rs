@@ -134,7 +134,8 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
     let tolerance = tolerance.given().map(|value| inertia::tolerance(value, ["mass", "centre", "inertia"], units.length));
     let couplings = root.get("couplings");
     let couplings = couplings.given().map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
-    let ChainBody { mass: payload_mass, centre: payload_centre, inertia: payload_inertia } = payload(root.get("payload"), &tool, units);
+    let ChainBody { mass: payload_mass, centre: payload_centre, inertia: payload_inertia } =
+        payload(root.get("payload"), &tool, units);
     RobotDescription {
         name,
         joints,

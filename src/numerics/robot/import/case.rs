@@ -74,10 +74,7 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
         inertias: DeclaredInertias {
             links: per_joint("inertia").iter().map(|value| value.given().map(inertia::moments)).collect(),
             payload: root.get("payload_inertia").given().map(inertia::moments),
-            tolerance: root
-                .get("inertia_tolerance")
-                .given()
-                .map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
+            tolerance: root.get("inertia_tolerance").given().map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
         },
     };
     let unused = root.keys().filter(|key| !KEYS.contains(key));

@@ -227,9 +227,8 @@ impl<'a> Reader<'a> {
         }
         let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre.coords).sum();
         let centre = Point3::from(moment / mass);
-        let about = |part: &ChainBody| {
-            Some(inertia::tensor(&part.inertia?) + inertia::offset(part.mass, &(part.centre - centre)))
-        };
+        let about =
+            |part: &ChainBody| Some(inertia::tensor(&part.inertia?) + inertia::offset(part.mass, &(part.centre - centre)));
         let tensors: Option<Vec<_>> = parts.iter().map(about).collect();
         let inertia = tensors.map(|all| inertia::of_tensor(&all.iter().sum()));
         Some(ChainBody { mass, centre, inertia })
