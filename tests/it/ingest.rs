@@ -47,6 +47,15 @@ pub fn robot(kinds: &str, half_turns: f64) -> Robot {
         orientation_z: None,
         gravity_m_s2: None,
         couplings: None,
+        inertia_xx_kg_m2: None,
+        inertia_xy_kg_m2: None,
+        inertia_xz_kg_m2: None,
+        inertia_yy_kg_m2: None,
+        inertia_yz_kg_m2: None,
+        inertia_zz_kg_m2: None,
+        tolerance_mass: None,
+        tolerance_centre_mm: None,
+        tolerance_inertia: None,
     };
     Robot(kinds.chars().zip(1..).map(row).collect())
 }

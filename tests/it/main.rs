@@ -72,6 +72,7 @@ mod strings;
 mod suspects;
 mod swarm;
 mod tables;
+mod torques;
 mod trail;
 mod transfer;
 mod twin;

@@ -97,6 +97,15 @@ impl TorqueCase {
         rows
     }
 
+    /// Joints over time and the rigid torques (Nm) of the arm as its user believes it to be.
+    pub fn rigid(&self) -> Vec<(JointState, Vec<f64>)> {
+        let torque = |state: JointState| {
+            let torque = self.stated.torque(&state);
+            (state, torque)
+        };
+        self.rows(&[]).state.into_iter().map(torque).collect()
+    }
+
     /// What the files hold: joints in deg as the encoder shows them, and currents (A) or torques (Nm), row-major.
     pub(super) fn measured(&self, rows: &TorqueRows) -> (Vec<f64>, Vec<f64>) {
         let n = self.stated.axes.len();

@@ -255,6 +255,15 @@ fn robot(name: &str) -> Robot {
         orientation_z: None,
         gravity_m_s2: None,
         couplings: None,
+        inertia_xx_kg_m2: None,
+        inertia_xy_kg_m2: None,
+        inertia_xz_kg_m2: None,
+        inertia_yy_kg_m2: None,
+        inertia_yz_kg_m2: None,
+        inertia_zz_kg_m2: None,
+        tolerance_mass: None,
+        tolerance_centre_mm: None,
+        tolerance_inertia: None,
     };
     let axes =
         [([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 670.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 1745.0])];

@@ -1,0 +1,181 @@
+//! Torques of moving arms through the real command: practice recordings, recordings of the twin, bad input.
+
+mod concealed;
+mod hostile;
+
+use crate::desk::shared;
+use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, JointMotion};
+use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An effect and where it sits.
+type Named = (String, String);
+
+fn from_environment(name: &str, otherwise: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+}
+
+fn named(entry: &Value) -> Named {
+    let text = |key: &str| entry[key].as_str().expect("a name").to_string();
+    (text("effect"), text("where"))
+}
+
+/// `calib diagnose` of a folder, with a store beside it.
+fn diagnose(case: &Path, store: &Path, more: &[&str]) -> Output {
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+    command.args(["diagnose", "--quiet", "--set"]).arg(format!("case={}", case.display())).arg("--store").arg(store);
+    command.args(more).arg(pipeline).output().expect("calib")
+}
+
+/// The document of a diagnosis that succeeds.
+fn document(case: &Path, store: &Path) -> Value {
+    let output = diagnose(case, store, &["--json"]);
+    let (out, told) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}: {out}{told}", case.display());
+    serde_json::from_str(&out).expect("one JSON document")
+}
+
+/// What of a diagnosis is missed, and what is named beside.
+struct Marks {
+    missed: Vec<String>,
+    /// Missed, and nothing is named at any accepted place.
+    misplaced: usize,
+    beside: Vec<Named>,
+    wanted: usize,
+}
+
+fn mark(want: &Value, told: &Value) -> Marks {
+    let mut found: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
+    let all = found.clone();
+    let mut marks = Marks { missed: Vec::new(), misplaced: 0, beside: Vec::new(), wanted: 0 };
+    for entry in want["effects"].as_array().expect("effects") {
+        let pair = |pair: &Value| (pair[0].as_str().expect("a name").to_string(), pair[1].as_str().expect("a place").to_string());
+        let accepted: Vec<Named> = entry["accept"].as_array().expect("names").iter().map(pair).collect();
+        let hit = found.iter().any(|one| accepted.contains(one));
+        found.retain(|one| !accepted.contains(one));
+        if entry["optional"].as_bool() == Some(true) {
+            continue;
+        }
+        marks.wanted += 1;
+        if !hit {
+            marks.missed.push(format!("{} at {} (L {:.0})", accepted[0].0, accepted[0].1, entry["L"].as_f64().unwrap_or(0.0)));
+            marks.misplaced += usize::from(!all.iter().any(|one| accepted.iter().any(|wanted| wanted.1 == one.1)));
+        }
+    }
+    marks.beside = found;
+    marks
+}
+
+fn write(folder: &Path, files: &[TorqueFile]) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    files.iter().for_each(|(name, text)| std::fs::write(folder.join(name), text).expect("a file"));
+}
+
+fn json(path: PathBuf) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("a file")).expect("JSON")
+}
+
+#[test]
+fn the_practice_recordings_of_torques_are_solved() {
+    let Some(folder) = shared("practice_dynamics") else { return };
+    let store = tempfile::tempdir().expect("a folder");
+    let mut wrong = Vec::new();
+    let mut cases: Vec<PathBuf> =
+        std::fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("one").path()).collect();
+    cases.sort();
+    for case in cases.iter().filter(|case| case.join("want.json").is_file()) {
+        let told = document(case, store.path());
+        let want = json(case.join("want.json"));
+        let marks = mark(&want, &told);
+        if !(marks.missed.is_empty() && marks.beside.is_empty()) {
+            wrong.push(format!("{}: missed {:?}, named beside {:?}", case.display(), marks.missed, marks.beside));
+        }
+        // A push begins within 0.3 s of when it did.
+        for entry in want["effects"].as_array().expect("effects").iter().filter(|entry| entry["window"].is_array()) {
+            let began = entry["window"][0].as_f64().expect("s");
+            let findings = told["findings"].as_array().expect("findings");
+            let contact = findings.iter().filter(|finding| finding["effect"] == "contact");
+            let starts = contact.flat_map(|finding| finding["parameters"].as_array().expect("numbers"));
+            let near = starts
+                .filter(|number| number["name"] == "start")
+                .any(|number| number["value"].as_f64().is_some_and(|start| (start - began).abs() < 0.3));
+            assert!(near, "{}: no contact starts near {began} s", case.display());
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_example_of_torques_is_solved_and_reported() {
+    let store = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let example = root.join("pipelines/dynamics/example");
+    let told = document(&example, store.path());
+    let found: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
+    let hidden = json(example.join("truth.json"));
+    let mut wanted: Vec<Named> = hidden["effects"].as_array().expect("effects").iter().map(named).collect();
+    wanted.retain(|one| !found.contains(one));
+    assert_eq!(wanted, Vec::<Named>::new(), "hidden and not found");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+    let run = command.args(["run", "--quiet", "--store"]).arg(store.path()).arg(root.join("pipelines/dynamics/pipeline.yaml"));
+    let run = run.output().expect("calib");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// Two mathematics that share nothing: sums over the bodies beyond each joint, and the estimator's recursion.
+#[test]
+fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
+    let design = TorqueDesign { seed: 3, nulls: 1.0, other_forms: 0.0, most: 0, seconds: 16.0, rate: 20.0 };
+    for number in 0..6 {
+        let case = TorqueCase::draw(&design, number);
+        let (arm, theta) = declared(&case);
+        let mut dynamics = InverseDynamics::new(&arm);
+        let gravity = arm.gravity;
+        for (state, torque) in case.rigid() {
+            let mut own = vec![0.0; torque.len()];
+            let motion = JointMotion { position: &state.q, velocity: &state.v, acceleration: &state.a };
+            dynamics.torque(motion, &gravity, &theta, &mut own);
+            let largest = torque.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
+            for (one, other) in own.iter().zip(&torque) {
+                assert!((one - other).abs() < 1e-9 * largest, "{} Nm and {} Nm", one, other);
+            }
+        }
+    }
+}
+
+/// The arm of a case, and the ten numbers of each link about its joint's point, payload on the last, by the parallel-axis rule.
+fn declared(case: &TorqueCase) -> (DynamicArm, Vec<f64>) {
+    let robot = &case.robot;
+    let last = robot.joints.len() - 1;
+    let mut theta = vec![0.0; INERTIAL_NUMBERS * robot.joints.len()];
+    let mut add = |link: usize, mass: f64, centre: [f64; 3], moments: [f64; 6]| {
+        let point = robot.joints[link].point;
+        let r = [0, 1, 2].map(|k| centre[k] - point[k]);
+        let square = r.iter().map(|x| x * x).sum::<f64>();
+        let mut ten = vec![mass, mass * r[0], mass * r[1], mass * r[2]];
+        for ((row, column), moment) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().zip(moments) {
+            ten.push(moment + mass * (if row == column { square } else { 0.0 } - r[row] * r[column]));
+        }
+        theta[INERTIAL_NUMBERS * link..].iter_mut().zip(ten).for_each(|(sum, value)| *sum += value);
+    };
+    for (link, (joint, moments)) in robot.joints.iter().zip(&robot.inertias.links).enumerate() {
+        add(link, joint.mass.expect("a mass"), joint.centre.expect("a centre"), moments.expect("an inertia"));
+    }
+    add(last, robot.payload_mass, robot.payload_centre, robot.inertias.payload.expect("an inertia"));
+    let arm = DynamicArm {
+        axes: robot.joints.iter().map(|joint| joint.axis.into()).collect(),
+        points: robot.joints.iter().map(|joint| joint.point.into()).collect(),
+        prismatic: vec![false; robot.joints.len()],
+        tool: robot.tool.into(),
+        links: None,
+        payload: None,
+        gravity: robot.gravity.into(),
+        ratio: vec![1.0; robot.joints.len()],
+        coupled: Vec::new(),
+        tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.004, inertia_relative: 0.05 },
+    };
+    (arm, theta)
+}

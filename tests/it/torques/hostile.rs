@@ -1,0 +1,143 @@
+//! Bad recordings of torques: each has a clear answer with file, line or place, and is not diagnosed.
+
+use super::{diagnose, write};
+use calib::twin::torque::{TorqueCase, TorqueDesign};
+use std::path::Path;
+
+struct Sheet {
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Sheet {
+    fn read(text: &str) -> Self {
+        let cells = |line: &str| line.split(',').map(String::from).collect::<Vec<String>>();
+        let mut lines = text.lines();
+        Self { header: cells(lines.next().expect("a header")), rows: lines.map(cells).collect() }
+    }
+    fn column(&self, name: &str) -> usize {
+        self.header.iter().position(|column| column == name).unwrap_or_else(|| panic!("no column {name}"))
+    }
+    fn number(&self, row: usize, column: usize) -> f64 {
+        self.rows[row][column].parse().expect("a number")
+    }
+    fn change(&mut self, columns: &[String], of: impl Fn(f64) -> f64) {
+        for name in columns {
+            let column = self.column(name);
+            for row in 0..self.rows.len() {
+                self.rows[row][column] = format!("{:.6}", of(self.number(row, column)));
+            }
+        }
+    }
+    fn exchange(&mut self, one: &str, other: &str) {
+        let (one, other) = (self.column(one), self.column(other));
+        self.rows.iter_mut().for_each(|row| row.swap(one, other));
+    }
+    fn without(&mut self, names: &[String]) {
+        for name in names {
+            let column = self.column(name);
+            self.header.remove(column);
+            self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+        }
+    }
+    fn text(&self) -> String {
+        let lines = std::iter::once(&self.header).chain(&self.rows).map(|cells| cells.join(","));
+        lines.collect::<Vec<_>>().join("\n") + "\n"
+    }
+}
+
+/// An arm with motor currents.
+fn case() -> (TorqueCase, Sheet) {
+    let design = TorqueDesign { seed: 5, nulls: 1.0, other_forms: 0.0, most: 0, seconds: 32.0, rate: 50.0 };
+    let case = (0..20).map(|number| TorqueCase::draw(&design, number)).find(|case| case.robot.name == "compact6").expect("one");
+    let sheet = Sheet::read(&case.recording()[1].1);
+    (case, sheet)
+}
+
+fn columns(pattern: &str) -> Vec<String> {
+    (1..=6).map(|joint| pattern.replace("{j}", &joint.to_string())).collect()
+}
+
+/// What calib says of a changed recording; the exit code too.
+fn told(change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32, String) {
+    let (case, mut sheet) = case();
+    change(&mut sheet);
+    write(folder, &[case.recording()[0].clone(), ("recording.csv", sheet.text())]);
+    let output = diagnose(folder, &folder.join("store"), &[]);
+    (output.status.code().expect("a code"), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+fn refused(change: impl FnOnce(&mut Sheet), words: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, told) = told(change, folder.path());
+    assert!([2, 10].contains(&code), "exit code {code}: {told}");
+    for word in words {
+        assert!(told.contains(word), "no `{word}` in: {told}");
+    }
+}
+
+#[test]
+fn milliamperes_for_amperes_are_refused() {
+    refused(|sheet| sheet.change(&columns("i{j}_a"), |current| 1e3 * current), &["unit"]);
+}
+
+#[test]
+fn radians_for_degrees_are_refused() {
+    refused(|sheet| sheet.change(&columns("q{j}_deg"), f64::to_radians), &["joint"]);
+}
+
+#[test]
+fn exchanged_joints_are_refused() {
+    refused(|sheet| sheet.exchange("i2_a", "i3_a"), &["joint 2", "joint 3", "exchanged"]);
+}
+
+#[test]
+fn a_clock_that_jumps_or_goes_back_is_refused_at_its_line() {
+    let later = |sheet: &mut Sheet, seconds: f64| {
+        let column = sheet.column("time_s");
+        for row in 120..sheet.rows.len() {
+            sheet.rows[row][column] = format!("{:.3}", sheet.number(row, column) + seconds);
+        }
+    };
+    refused(|sheet| later(sheet, 5.0), &["recording.csv:122", "the clock jumps by 5.0"]);
+    refused(|sheet| later(sheet, -1.0), &["recording.csv:122", "the clock goes back"]);
+}
+
+#[test]
+fn a_dead_channel_is_refused_with_its_joint() {
+    refused(|sheet| sheet.change(&["i3_a".into()], |_| 0.25), &["current of joint 3", "0.25 in each of"]);
+}
+
+#[test]
+fn missing_columns_are_named() {
+    refused(|sheet| sheet.without(&columns("i{j}_a")), &["recording.csv", "neither torques nor motor currents"]);
+    refused(|sheet| sheet.without(&["q3_deg".into()]), &["recording.csv", "q3_deg"]);
+    refused(|sheet| sheet.without(&["time_s".into()]), &["recording.csv", "time_s"]);
+}
+
+#[test]
+fn an_arm_that_hardly_moves_is_refused() {
+    let still = |sheet: &mut Sheet| {
+        let names = columns("q{j}_deg");
+        let first: Vec<f64> = names.iter().map(|name| sheet.number(0, sheet.column(name))).collect();
+        names
+            .iter()
+            .zip(first)
+            .for_each(|(name, first)| sheet.change(std::slice::from_ref(name), |q| first + 1e-3 * (q - first)));
+    };
+    refused(still, &["hardly moves"]);
+}
+
+#[test]
+fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
+    let spoiled = |every: usize| {
+        move |sheet: &mut Sheet| {
+            let column = sheet.column("q2_deg");
+            sheet.rows.iter_mut().step_by(every).for_each(|row| row[column] = "lost".into());
+        }
+    };
+    refused(spoiled(10), &["recording.csv:2", "rows are rejected", "`lost` is not a number"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, said) = told(spoiled(400), folder.path());
+    assert_eq!(code, 0, "{said}");
+}
