@@ -71,7 +71,8 @@ pub fn sockets<'a>(request: &'a PoseRequest, robot: &RobotFiles, places: &[[f64;
         priors: priors(),
         seed: request.seed,
     };
-    let proposal = propose_brought(&RobotModel::new(imported.clone()), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
+    let proposal =
+        propose_brought(&RobotModel::new(imported.clone()), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
     let joints = imported.joints.len();
     Ok(SocketProposal {
         request,
@@ -132,7 +133,10 @@ impl PoseAnswer for SocketProposal<'_> {
         }
         text.push_str(&format!(
             "\nwhat is known of the arm, one sigma\n  {:28}  {:>10}  {:>10}  {:>24}\n",
-            "", "before", "after", format!("random, median of {sets}")
+            "",
+            "before",
+            "after",
+            format!("random, median of {sets}")
         ));
         for (k, before, after, random) in sigma.iter().filter(|(k, ..)| !self.name(*k).0.starts_with("link_geometry")) {
             let (name, unit) = self.name(*k);
@@ -141,7 +145,10 @@ impl PoseAnswer for SocketProposal<'_> {
         }
         let links = || sigma.iter().filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"));
         let shown = links().filter(|(_, before, after, _)| 2.0 * after < *before).count();
-        text.push_str(&format!("  links: {shown} of {} are known twice as well as by their maker\n", counted(links().count(), "parameter")));
+        text.push_str(&format!(
+            "  links: {shown} of {} are known twice as well as by their maker\n",
+            counted(links().count(), "parameter")
+        ));
         text.push_str(&format!(
             "\nby the postures alone, with the ball off the axis of joint {}\n  {:>8}  {:>28}  {:>24}\n",
             self.robot.joints.len(),
@@ -169,9 +176,11 @@ impl PoseAnswer for SocketProposal<'_> {
             let [before, after, random] = [*before, *after, *random].map(|sigma| unit.from_si(sigma));
             json!({"name": name, "unit": unit.symbol(), "sigma_before": before, "sigma": after, "sigma_random": random})
         });
-        let sockets = self.places.iter().zip(without).map(|(place, own)| {
-            json!({"place_m": place, "postures": own.count, "growth_without": own.growth})
-        });
+        let sockets = self
+            .places
+            .iter()
+            .zip(without)
+            .map(|(place, own)| json!({"place_m": place, "postures": own.count, "growth_without": own.growth}));
         let offsets = offsets.iter().map(|own| {
             let weakest = own.weakest.is_finite().then_some(1e3 * own.weakest);
             json!({"off_axis_mm": 1e3 * own.off, "directions": own.directions, "known": own.known, "weakest_mm_or_mrad": weakest})

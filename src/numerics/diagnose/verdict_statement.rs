@@ -73,7 +73,10 @@ impl Ground {
         let scatter = self.small(self.scatter());
         match self.instrument {
             Some(closing) if self.brought => {
-                format!("{scatter} scatter at random, of which the stated repeatability of closing explains {}", self.number(closing))
+                format!(
+                    "{scatter} scatter at random, of which the stated repeatability of closing explains {}",
+                    self.number(closing)
+                )
             }
             Some(instrument) => {
                 format!("{scatter} scatter at random, of which the instrument explains {}", self.number(instrument))

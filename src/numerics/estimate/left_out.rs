@@ -59,7 +59,8 @@ fn placed_by(model: &Model, data: &Measurements, unseen: &BTreeMap<usize, Vec<us
     let rows: BTreeSet<usize> = unseen.values().flatten().copied().collect();
     let rows: Vec<usize> = rows.into_iter().collect();
     for (number, own) in unseen {
-        let axes = |row: &usize| kinds(data).iter().filter(|kind| kind.is_brought()).map(|kind| kind.axes(data, *row)).sum::<usize>();
+        let axes =
+            |row: &usize| kinds(data).iter().filter(|kind| kind.is_brought()).map(|kind| kind.axes(data, *row)).sum::<usize>();
         let (values, placed) = (own.iter().map(axes).sum::<usize>(), model.robot.setup().anchors[*number].shape.parameters());
         let by = if values > placed { values as f64 / (values - placed) as f64 } else { f64::NAN };
         inflation.extend(own.iter().map(|row| (*row, by)));

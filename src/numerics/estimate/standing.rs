@@ -33,7 +33,9 @@ impl Model {
             (Shape::Plane(before), Shape::Plane(normal)) if axis == 0 => {
                 Some((before.dot(&anchor.place), normal.dot(&now.place)))
             }
-            (Shape::Plane(before), Shape::Plane(normal)) => Some((Anchor::tilts(&before)[axis - 1], Anchor::tilts(&normal)[axis - 1])),
+            (Shape::Plane(before), Shape::Plane(normal)) => {
+                Some((Anchor::tilts(&before)[axis - 1], Anchor::tilts(&normal)[axis - 1]))
+            }
             (Shape::Sphere(before), Shape::Sphere(radius)) if axis == 3 => Some((before, radius)),
             _ => Some((anchor.place[axis], now.place[axis])),
         }

@@ -65,7 +65,8 @@ fn robots_that_need_a_technician_come_first_with_the_reason() {
         "<li>robot 2: its error is not explained: gear_cyclic at joint 2</li>",
     ];
     assert!(told.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
-    let rows = ["robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1"].map(|name| at(&format!("<td class=\"name\">{name}<")));
+    let rows =
+        ["robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1"].map(|name| at(&format!("<td class=\"name\">{name}<")));
     assert!(rows.is_sorted(), "{rows:?}");
 }
 

@@ -84,8 +84,10 @@ fn a_ball_that_was_put_back_elsewhere_is_found() {
 fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
-    let moved: Vec<Fixture> =
-        cell(30).into_iter().map(|own| Fixture { centre_mm: [own.centre_mm[0] + 1.5, own.centre_mm[1], own.centre_mm[2] + 1.0], ..own }).collect();
+    let moved: Vec<Fixture> = cell(30)
+        .into_iter()
+        .map(|own| Fixture { centre_mm: [own.centre_mm[0] + 1.5, own.centre_mm[1], own.centre_mm[2] + 1.0], ..own })
+        .collect();
     let slipped = touched(&robot, &truth(&robot, 34), &moved, 35);
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;

@@ -27,7 +27,13 @@ fn planes_and_spheres_stand_where_they_were_identified() {
     let prediction = desk::table::<Prediction>(&tables).remove(0);
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("read again");
     for (error, row) in model.row_errors(&data).iter().zip(&prediction.0) {
-        assert!((1e3 * error.length - row.error_mm).abs() < 1e-6, "{}: {} and {}", row.point_id, 1e3 * error.length, row.error_mm);
+        assert!(
+            (1e3 * error.length - row.error_mm).abs() < 1e-6,
+            "{}: {} and {}",
+            row.point_id,
+            1e3 * error.length,
+            row.error_mm
+        );
     }
     let value = |name: &str| parameters.0.iter().find(|row| row.name == name).expect("a row").value;
     assert!((value("anchor.ball.radius") - 40.0).abs() < 0.3, "{}", value("anchor.ball.radius"));

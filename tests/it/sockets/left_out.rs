@@ -11,7 +11,8 @@ use calib::twin::touch::Fixture;
 fn split(yaml: &str, recording: &Recording) -> Result<Split, String> {
     let options = serde_saphyr::options! { strict_booleans: true };
     let settings: SplitBy = serde_saphyr::from_str_with_options(yaml, options).expect("good settings");
-    let tables = Desk::default().run(&settings, SplitReads { recording: recording.clone() }).map_err(|error| error.to_string())?;
+    let tables =
+        Desk::default().run(&settings, SplitReads { recording: recording.clone() }).map_err(|error| error.to_string())?;
     Ok(table::<Split>(&tables).remove(0))
 }
 

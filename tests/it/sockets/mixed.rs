@@ -16,7 +16,8 @@ const SIGMA: f64 = 2e-5;
 fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
     let (rows, more) = (points.rows(), sockets.rows());
     let own = &sockets.readings[0];
-    let names: Vec<&str> = std::iter::repeat_n("", rows).chain((0..more).map(|row| own.row(row).expect("a socket").anchor)).collect();
+    let names: Vec<&str> =
+        std::iter::repeat_n("", rows).chain((0..more).map(|row| own.row(row).expect("a socket").anchor)).collect();
     let readings = Readings {
         kind: own.kind,
         sigma: std::iter::repeat_n(f64::NAN, rows).chain(own.sigma.iter().copied()).collect(),
@@ -46,7 +47,11 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
             Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool)
         };
         points.position = (0..points.rows())
-            .map(|row| there(&points, row) + Vector3::new(1.0, -2.0, 0.5) + Vector3::from([0, 1, 2].map(|axis| SIGMA * normal(7 * row + axis))))
+            .map(|row| {
+                there(&points, row)
+                    + Vector3::new(1.0, -2.0, 0.5)
+                    + Vector3::from([0, 1, 2].map(|axis| SIGMA * normal(7 * row + axis)))
+            })
             .collect();
         points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
         let data = beside(points, &touched(&robot, &truth, &cell, 21).measurements());

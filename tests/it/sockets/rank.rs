@@ -92,8 +92,7 @@ fn wind_up_adds_one_for_each_joint_that_gravity_loads() {
         let fixtures = [socket("a", A, 60, 0.0), socket("c", C, 60, 0.0)];
         let data = touched(&robot, &truth(&robot, 1), &fixtures, 7).measurements();
         let (model, fitted) = calibrated(&robot, &data, &[], &["joint_compliance"]);
-        let wind_up: Vec<&ParameterStatus> =
-            model.stack.parameters_of("joint_compliance").map(|k| &fitted.statuses[k]).collect();
+        let wind_up: Vec<&ParameterStatus> = model.stack.parameters_of("joint_compliance").map(|k| &fitted.statuses[k]).collect();
         assert!(wind_up.iter().all(|status| !matches!(status, ParameterStatus::Redundant(_))), "{}: {wind_up:?}", robot.name);
         // The first axis is vertical: nothing loads it. Masses near the axes of a wrist load these too little to be seen.
         assert!(matches!(wind_up[0], ParameterStatus::Unseen), "{}: {wind_up:?}", robot.name);

@@ -222,10 +222,7 @@ pub fn propose_brought(robot: &RobotModel, site: &Site, request: &BroughtRequest
     let without = (0..request.places.len()).map(|socket| {
         let left: Vec<usize> = chosen.iter().copied().filter(|row| sockets[*row] != socket).collect();
         let less = sigmas(&gather(&rows, &left), &before);
-        LeftOutPlace {
-            count: chosen.len() - left.len(),
-            growth: median(arm.iter().map(|k| less[*k] / proposed[*k]).collect()),
-        }
+        LeftOutPlace { count: chosen.len() - left.len(), growth: median(arm.iter().map(|k| less[*k] / proposed[*k]).collect()) }
     });
     let (sets, without) = (random.len(), without.collect());
     let poses = subset(&drawn, &chosen);
