@@ -119,6 +119,16 @@ struct Picture {
     cumulative: String,
 }
 
+/// What is left out together, beside parts drawn at random.
+fn blocks(rows: &[StatisticsRow]) -> &'static str {
+    let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
+    match (folded().any(StatisticsRow::is_brought), folded().all(StatisticsRow::is_brought)) {
+        (true, true) => "whole places",
+        (true, false) => "contiguous parts of the recording; whole places",
+        (false, _) => "contiguous parts of the recording",
+    }
+}
+
 impl ErrorsSection {
     pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
         let rows = &tables.statistics.0;
@@ -150,10 +160,7 @@ impl ErrorsSection {
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
-            blocks: match rows.iter().filter(|row| row.fold_rms_mm.is_some()).all(StatisticsRow::is_brought) {
-                true => "whole places",
-                false => "contiguous parts of the recording",
-            },
+            blocks: blocks(rows),
             unfolded: unfolded(tables),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),

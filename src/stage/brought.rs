@@ -1,14 +1,14 @@
-//! What identifications know and say of rows in which the target was only brought to something: lengths known from elsewhere, how well
-//! it closes, which rows stand out, and what such data tell of the scale of the arm.
+//! What identifications and diagnoses say of rows in which the target was only brought to something: how well it closes, which rows stand
+//! out, and what such data tell of the scale of the arm.
 
 use crate::effect::AnchorShift;
-use crate::error::{Error, Fault, Result, counted};
-use crate::estimate::{Fitted, KnownLength, Model, ParameterStatus, Prior, align_points, reseated, scale};
-use crate::observation::{MeasurementKind, kinds, only_brought};
-use crate::robot::{Measurements, RobotModel, Shape};
-use crate::spatial::Pose;
+use crate::error::counted;
+use crate::estimate::{Fitted, Model, ParameterStatus, reseated, scale};
+use crate::observation::{MeasurementKind, kinds};
+use crate::robot::{Measurements, Shape};
 use crate::stage::Context;
 use crate::table::Recording;
+<<<<<<< HEAD
 use nalgebra::{Rotation3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -174,6 +174,9 @@ pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> 
     }
     Ok(())
 }
+=======
+use nalgebra::Vector3;
+>>>>>>> sock
 
 /// A row farther off than so many standard deviations is named.
 const FAR: f64 = 4.0;

@@ -9,8 +9,9 @@ use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, kn
 use crate::observation;
 use crate::robot::{Measurements, RobotModel, Visited};
 use crate::spatial::Pose;
-use crate::stage::brought::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
+use crate::stage::brought;
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
 use crate::stage::screened::{fit_rows, numbered};
 use crate::stage::weightless::weightless_links;
 use crate::stage::{Context, Stage};
@@ -69,7 +70,7 @@ impl Stage for Identify {
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = self.shared_faults("fit");
-        faults.extend(brought::faults(&self.known_cell()));
+        faults.extend(known_cell::faults(&self.known_cell()));
         for (name, place) in &self.targets {
             if !place.iter().all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET) {
                 faults.push(Fault::new(
@@ -122,7 +123,7 @@ impl Stage for Identify {
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
-        brought::apply(&mut model, &self.known_cell(), context)?;
+        known_cell::apply(&mut model, &self.known_cell(), context)?;
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
@@ -196,7 +197,7 @@ impl Identify {
         }
         let stated = self.targets.iter().map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3)).collect();
         let (robot, base) = gauge(robot, data, rows, &stated).map_err(|message| Error::data("table recording", message))?;
-        Ok(brought::standing(robot, base, &self.points, data, rows))
+        Ok(known_cell::standing(robot, base, &self.points, data, rows))
     }
 
     fn known_cell(&self) -> KnownCell<'_> {

@@ -7,6 +7,10 @@
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::stage::copied::{self, copied_rows};
+<<<<<<< HEAD
+=======
+use crate::stage::named_column::NamedColumn;
+>>>>>>> sock
 use crate::stage::parameter_set::matches;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
@@ -89,45 +93,6 @@ pub enum SplitBy {
         /// Sets with their numbers of rows; the last may leave its number out and takes what is left.
         sets: Vec<Stretch>,
     },
-}
-
-/// A column of names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum NamedColumn {
-    /// What sockets the target lay in.
-    Socket,
-    /// Planes that it touched.
-    Plane,
-    /// Spheres that it touched.
-    Sphere,
-    /// Ends of distances.
-    Anchor,
-    /// Targets on the tool.
-    Target,
-}
-
-impl NamedColumn {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Socket => "socket",
-            Self::Plane => "plane",
-            Self::Sphere => "sphere",
-            Self::Anchor => "anchor",
-            Self::Target => "target",
-        }
-    }
-
-    /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
-    fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
-        let column = if self == Self::Target { recording.target.as_ref() } else { recording.names.get(self.name()) };
-        let column = column.ok_or_else(|| {
-            let there: Vec<&str> = recording.names.keys().copied().chain(recording.target.as_ref().map(|_| "target")).collect();
-            let there = if there.is_empty() { "none".to_string() } else { there.join(", ") };
-            Error::data(format!("with.{place}"), format!("the recording has no names of `{}`; it has: {there}", self.name()))
-        })?;
-        Ok(column.iter().map(|name| name.as_deref().unwrap_or_default()).collect())
-    }
 }
 
 /// So many rows for one set.

@@ -53,7 +53,12 @@ fn folds(rows: &[StatisticsRow]) -> String {
         rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
     };
     let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
-    let blocks = if rows.iter().all(|row| row.is_brought()) { "whole places" } else { "contiguous folds" };
+    let brought = rows.iter().filter(|row| row.is_brought()).count();
+    let blocks = match brought {
+        0 => "contiguous folds",
+        some if some == rows.len() => "whole places",
+        _ => "contiguous folds, whole places",
+    };
     let mut text = format!(
         "training points, each under a fit without it (cross-validated), error in mm: random folds | {blocks}\n  \
          {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",

@@ -141,7 +141,8 @@ impl Experiment<'_> {
                 time_s += clock.uniform(pace_s[0], pace_s[1]);
                 let temperature_c = self.climate.temperature(time_s);
                 let there = fixture.point(&mut draw, &mut noise);
-                let q = self.reach(&arm, &effects, &ranges, there, [time_s, temperature_c], &mut draw);
+                let before = touches.last().map(|touch: &Touch| touch.q.clone());
+                let q = self.reach(&arm, &effects, &ranges, (there, before.as_deref()), [time_s, temperature_c], &mut draw);
                 let q = q.ok_or_else(|| {
                     let [x, y, z] = fixture.centre_mm;
                     format!(
@@ -155,13 +156,13 @@ impl Experiment<'_> {
         Ok(touches)
     }
 
-    /// Joints at which the settled arm holds the ball at a point, m.
+    /// Joints at which the settled arm holds the ball at a point, m, coming from joints `before`.
     fn reach(
         &self,
         arm: &Arm,
         effects: &[Physical],
         ranges: &[[f64; 2]],
-        there: Vector,
+        (there, before): (Vector, Option<&[f64]>),
         [time_s, temperature_c]: [f64; 2],
         draw: &mut Noise,
     ) -> Option<Vec<f64>> {
@@ -170,7 +171,10 @@ impl Experiment<'_> {
             let row = Row {
                 command: q.to_vec(),
                 drive: self.truth.drive(self.robot, q),
-                direction: vec![0.0; joints],
+                direction: match before {
+                    Some(before) => q.iter().zip(before).map(|(q, before)| (q - before).signum()).collect(),
+                    None => vec![0.0; joints],
+                },
                 time_s,
                 temperature_c,
                 payload_kg: 0.0,

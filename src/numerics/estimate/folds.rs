@@ -41,7 +41,7 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
     let order = whole.divisible(&parts, count)?;
-    let blocks = positions(data, rows).unwrap_or_else(|| deal(&order, rows.len(), count));
+    let blocks = blocks(data, rows, &order, count);
     let random = at_random(order, rows.len(), count, seed);
     let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds, ErrorScale::Lengths));
     Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
@@ -124,9 +124,16 @@ fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
     rows.chunks(rows.len().div_ceil(STRETCHES).max(1)).map(<[usize]>::to_vec).collect()
 }
 
-/// Rows by the place that their target was brought to, where that is all that any measured and there are several.
-fn positions(data: &Measurements, rows: &[usize]) -> Option<Vec<Vec<usize>>> {
+/// Every place that the target was brought to with its rows and, of the other poses, contiguous stretches; where there is but one place,
+/// stretches of all.
+fn blocks(data: &Measurements, rows: &[usize], order: &[&Vec<usize>], count: usize) -> Vec<Vec<usize>> {
+    let brought: Vec<_> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+    let place = |row: usize| {
+        let name = brought.iter().find_map(|kind| kind.reading(data, row)).map(|reading| reading.anchor)?;
+        Some(name.rsplit_once('/').map_or(name, |(place, _)| place))
+    };
     let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+<<<<<<< HEAD
     let kinds = kinds(data);
     for row in rows {
         let name = kinds
@@ -134,8 +141,23 @@ fn positions(data: &Measurements, rows: &[usize]) -> Option<Vec<Vec<usize>>> {
             .filter(|kind| kind.axes(data, *row) > 0)
             .try_fold("", |_, kind| Some(kind.reading(data, *row)?.anchor).filter(|_| kind.is_brought()))?;
         places.entry(name.rsplit_once('/').map_or(name, |(place, _)| place)).or_default().push(*row);
+=======
+    let mut others: Vec<&Vec<usize>> = Vec::new();
+    for pose in order {
+        match pose.first().and_then(|row| place(*row)) {
+            Some(name) => places.entry(name).or_default().extend_from_slice(pose),
+            None => others.push(*pose),
+        }
+>>>>>>> sock
     }
-    (places.len() > 1).then(|| places.into_values().collect())
+    if places.len() + usize::from(!others.is_empty()) < 2 {
+        return deal(order, rows.len(), count);
+    }
+    let left = others.iter().map(|pose| pose.len()).sum();
+    let stretches = deal(&others, left, count).into_iter().filter(|stretch| !stretch.is_empty());
+    let mut blocks: Vec<Vec<usize>> = places.into_values().chain(stretches).collect();
+    blocks.iter_mut().for_each(|block| block.sort_unstable());
+    blocks
 }
 
 /// Rows of each fold, sorted: poses in the given order, about as many rows in each.

@@ -4,7 +4,7 @@ use super::covariance::Covariance;
 use super::model::Model;
 use crate::effect::{AnchorShift, ToolOffset};
 use crate::observation::only_brought;
-use crate::robot::Measurements;
+use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
 use nalgebra::{DVector, Vector3};
 
@@ -54,12 +54,24 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
         let along = covariance.block(parameters)? * &weights;
         let whole = weights.dot(&along);
-        // How the scale follows the mean of each prior, in standard deviations of that.
+        // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes beside it.
         let lengths = parameters.iter().enumerate().filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
         let lengths = lengths.filter(|(_, k)| links.contains(k));
+<<<<<<< HEAD
         let parts: Vec<f64> = lengths.filter_map(|(row, k)| Some(along[row].abs() / model.known(*k).prior?.sigma)).collect();
         let apart: f64 = parts.iter().map(|part| part * part).sum();
         let together = (whole - apart).max(0.0) + parts.iter().sum::<f64>().powi(2);
+=======
+        let part = |(row, k): (usize, &usize)| {
+            let part = along[row].abs() / model.known(*k).prior?.sigma;
+            Some((part, carried(&model.robot, &model.stack.specs()[*k].name) as f64))
+        };
+        let parts: Vec<(f64, f64)> = lengths.filter_map(part).collect();
+        let own: f64 = parts.iter().map(|(part, _)| part * part).sum();
+        let together = (whole - own).max(0.0) + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
+        let whole = whole + parts.iter().map(|(part, carried)| part * part * carried).sum::<f64>();
+        let together = together.max(whole);
+>>>>>>> sock
         Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
@@ -76,6 +88,19 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })
 }
+
+/// How many errors of earlier links a shift of a link stands for beside its own: a link's error along the axis of its joint is none of its
+/// parameters, since a shift of the next link that is not along its own joint's axis does the same.
+fn carried(robot: &RobotModel, name: &str) -> usize {
+    let parts = name.strip_prefix("link_geometry.l").and_then(|own| own.split_once('.'));
+    let Some((Ok(link), axis)) = parts.map(|(link, axis)| (link.parse::<usize>(), axis)) else { return 0 };
+    let Some(axis) = ["x", "y", "z"].iter().position(|own| *own == axis) else { return 0 };
+    let along = |joint: &usize| robot.is_revolute(*joint) && robot.axis(*joint)[axis].abs() > ALONG;
+    (1..link.min(robot.joints())).rev().take_while(along).count()
+}
+
+/// Cosine beyond which an axis lies along another.
+const ALONG: f64 = 0.999;
 
 /// Sockets whose places are known beforehand.
 pub fn known_places(model: &Model) -> usize {

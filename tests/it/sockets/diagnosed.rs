@@ -59,6 +59,28 @@ fn a_cyclic_error_of_a_gear_is_named_at_its_joint() {
 }
 
 #[test]
+fn lost_motion_is_named_at_its_joint() {
+    let robot = fixture::seven();
+    let effects = "[{backlash: {joint: 2, gap_arcsec: 250}}]";
+    let (named, verdict, _) = diagnosed(&robot, touched_with(&robot, &truth(&robot, 36), effects, &cell(30), 36));
+    assert!(named.iter().any(|name| name == "backlash at joint 2"), "{named:?}, {:?}", verdict.statement);
+}
+
+#[test]
+fn a_ball_that_was_put_back_elsewhere_is_found() {
+    let robot = fixture::seven();
+    let before = truth(&robot, 37);
+    let mut after = before.clone();
+    after.links.last_mut().expect("links").shift_mm[0] += 1.5;
+    let (mut recording, second) = (touched(&robot, &before, &cell(30), 37), touched(&robot, &after, &cell(30), 38));
+    let half = 90 * recording.joints;
+    recording.q[half..].copy_from_slice(&second.q[half..]);
+    let (named, verdict, warnings) = diagnosed(&robot, recording);
+    let told = warnings.contains("sits elsewhere on the tool") || named.iter().any(|name| name.starts_with("tool_shift"));
+    assert!(told, "{named:?}, {:?}, {warnings}", verdict.statement);
+}
+
+#[test]
 fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
