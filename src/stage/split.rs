@@ -7,10 +7,7 @@
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::stage::copied::{self, copied_rows};
-<<<<<<< HEAD
-=======
 use crate::stage::named_column::NamedColumn;
->>>>>>> sock
 use crate::stage::parameter_set::matches;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};

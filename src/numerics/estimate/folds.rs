@@ -133,22 +133,12 @@ fn blocks(data: &Measurements, rows: &[usize], order: &[&Vec<usize>], count: usi
         Some(name.rsplit_once('/').map_or(name, |(place, _)| place))
     };
     let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-<<<<<<< HEAD
-    let kinds = kinds(data);
-    for row in rows {
-        let name = kinds
-            .iter()
-            .filter(|kind| kind.axes(data, *row) > 0)
-            .try_fold("", |_, kind| Some(kind.reading(data, *row)?.anchor).filter(|_| kind.is_brought()))?;
-        places.entry(name.rsplit_once('/').map_or(name, |(place, _)| place)).or_default().push(*row);
-=======
     let mut others: Vec<&Vec<usize>> = Vec::new();
     for pose in order {
         match pose.first().and_then(|row| place(*row)) {
             Some(name) => places.entry(name).or_default().extend_from_slice(pose),
             None => others.push(*pose),
         }
->>>>>>> sock
     }
     if places.len() + usize::from(!others.is_empty()) < 2 {
         return deal(order, rows.len(), count);

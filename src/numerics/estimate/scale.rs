@@ -57,11 +57,6 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         // How the scale follows the mean of each prior, in standard deviations of that; and the errors along axes beside it.
         let lengths = parameters.iter().enumerate().filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
         let lengths = lengths.filter(|(_, k)| links.contains(k));
-<<<<<<< HEAD
-        let parts: Vec<f64> = lengths.filter_map(|(row, k)| Some(along[row].abs() / model.known(*k).prior?.sigma)).collect();
-        let apart: f64 = parts.iter().map(|part| part * part).sum();
-        let together = (whole - apart).max(0.0) + parts.iter().sum::<f64>().powi(2);
-=======
         let part = |(row, k): (usize, &usize)| {
             let part = along[row].abs() / model.known(*k).prior?.sigma;
             Some((part, carried(&model.robot, &model.stack.specs()[*k].name) as f64))
@@ -71,7 +66,6 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         let together = (whole - own).max(0.0) + parts.iter().map(|(part, _)| part).sum::<f64>().powi(2);
         let whole = whole + parts.iter().map(|(part, carried)| part * part * carried).sum::<f64>();
         let together = together.max(whole);
->>>>>>> sock
         Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
