@@ -54,7 +54,7 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &spikes::Spikes,
     &wrist_coupling::WristCoupling,
     &payload::Payload,
-    &link_mass::WrongLinkMass,
+    &link_mass::HeavierLink,
     &link_com::WrongLinkCentre,
     &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
