@@ -50,7 +50,7 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::super::arm::{DynamicArm, InertialTolerance};
-    use super::super::clock::Clock;
+    use super::super::clock::RecordingClock;
     use super::super::recording::TorqueRecording;
     use super::super::reduce::Reduction;
     use super::super::scene::DynamicScene;
@@ -90,7 +90,7 @@ mod tests {
             held_out: vec![false; rows],
             from_current: false,
         };
-        let clock = Clock::of(&recording);
+        let clock = RecordingClock::of(&recording);
         let scene = DynamicScene::new(&arm, &recording, &clock, 10.0, true);
         base_parameters(&ReducedRegressor::of(&scene, &Reduction::new(&clock, 10.0))).len()
     }

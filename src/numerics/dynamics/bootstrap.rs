@@ -2,7 +2,7 @@
 
 use super::choice::CauseChoice;
 use super::regressor::TorqueColumn;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::dot;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -13,7 +13,7 @@ const DRAWS: usize = 60;
 const BLOCK: f64 = 1.0;
 
 /// Whether a worth is above that of the best form in every draw.
-pub(super) fn beats_chance(choice: &CauseChoice, set: &[usize], sweep: &Sweep, worth: f64) -> bool {
+pub(super) fn beats_chance(choice: &CauseChoice, set: &[usize], sweep: &SweptColumns, worth: f64) -> bool {
     let mut weighted = choice.weighted.with_measured(choice.weighted.measured.clone());
     weighted.subtract(&sweep.solution());
     let rows = weighted.rows;

@@ -72,7 +72,7 @@ fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64) -> Torque
         let then = time - latency;
         let motion: Vec<(f64, f64, f64)> = (0..n).map(|joint| moved(joint, then)).collect();
         let [q, dq, ddq] = [0, 1, 2].map(|part| motion.iter().map(|m| [m.0, m.1, m.2][part]).collect::<Vec<f64>>());
-        dynamics.torque(JointMotion { position: &q, velocity: &dq, acceleration: &ddq }, &real.gravity, &theta, &mut torque);
+        dynamics.torque(MotionRow { position: &q, velocity: &dq, acceleration: &ddq }, &real.gravity, &theta, &mut torque);
         for joint in 0..n {
             // Nearly normal.
             let noise: f64 = (0..12).map(|_| dice.random::<f64>() - 0.5).sum();
@@ -109,6 +109,12 @@ fn nothing_is_found_in_the_torques_of_the_declared_arm() {
     for noise in &diagnosis.noise {
         assert!((noise.sigma / (NOISE * 0.2f64.sqrt()) - 1.0).abs() < 0.2, "{noise:?}");
     }
+}
+
+#[test]
+fn the_same_recording_gets_the_same_answer() {
+    let recording = record(&arm(), 0.0, &|row| if row.0 == 2 { 0.4 * (row.3 / 0.003).tanh() } else { 0.0 });
+    assert_eq!(diagnosed(&recording), diagnosed(&recording));
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Whether a recording can be used at all: each fault is said with its joint or row and what is allowed.
 
 use super::arm::DynamicArm;
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::inertials::DeclaredInertials;
-use super::newton_euler::{InverseDynamics, JointMotion};
+use super::newton_euler::{InverseDynamics, MotionRow};
 use super::recording::TorqueRecording;
 use crate::error::{Error, Fault, Result};
 use crate::statistics::nearest;
@@ -193,7 +193,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let mut products = vec![vec![0.0; n]; n];
     for row in 0..recording.rows() {
         let position = &recording.position[row * n..(row + 1) * n];
-        dynamics.torque(JointMotion { position, velocity: &still, acceleration: &still }, &arm.gravity, &theta, &mut gravity);
+        dynamics.torque(MotionRow { position, velocity: &still, acceleration: &still }, &arm.gravity, &theta, &mut gravity);
         for joint in 0..n {
             let torque = recording.torque[row * n + joint];
             measured_square[joint] += torque * torque;
@@ -233,7 +233,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
 }
 
 /// What is odd about a recording that can be used, a sentence each.
-pub(super) fn remarks(recording: &TorqueRecording, clock: &Clock) -> Vec<String> {
+pub(super) fn remarks(recording: &TorqueRecording, clock: &RecordingClock) -> Vec<String> {
     let mut remarks = Vec::new();
     let usual = 1.0 / clock.rate;
     for stretch in &clock.stretches[1..] {

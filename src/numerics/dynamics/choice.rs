@@ -2,14 +2,14 @@
 
 use super::cause::{COULOMB, TorqueForm, VISCOUS};
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
     pub problem: &'a TorqueProblem<'a>,
     pub weighted: &'a WeightedColumns,
-    pub base: Sweep<'a>,
+    pub base: SweptColumns<'a>,
     pub seed: u64,
     /// Forms that may be chosen; trial forms of a refinement are none of them.
     pub open: usize,
@@ -18,7 +18,7 @@ pub(super) struct CauseChoice<'a> {
 impl<'a> CauseChoice<'a> {
     /// Over all forms of a problem.
     pub fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns, seed: u64) -> Self {
-        let base = Sweep::base(&problem.all, weighted);
+        let base = SweptColumns::base(&problem.all, weighted);
         Self { problem, weighted, base, seed, open: problem.all.listed }
     }
 
@@ -33,7 +33,7 @@ impl<'a> CauseChoice<'a> {
     }
 
     /// Gain beyond the penalty of a form, given a swept set.
-    pub fn worth(&self, sweep: &Sweep, number: usize) -> f64 {
+    pub fn worth(&self, sweep: &SweptColumns, number: usize) -> f64 {
         let gain = sweep.gain(number);
         if self.form(number).cause.is_positive() && !sweep.rises(number) {
             return f64::NEG_INFINITY;

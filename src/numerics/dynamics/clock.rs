@@ -11,14 +11,14 @@ const JUMP: f64 = 4.0;
 
 /// Rate and runs.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Clock {
+pub(super) struct RecordingClock {
     /// Hz.
     pub rate: f64,
     /// Rows without a gap in time or position, ascending.
     pub stretches: Vec<Range<usize>>,
 }
 
-impl Clock {
+impl RecordingClock {
     /// Of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
         let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();

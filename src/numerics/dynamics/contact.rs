@@ -37,17 +37,17 @@ const MOVING: f64 = 0.3;
 
 /// What a residual is left by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Beside {
+pub(super) enum ContactModel {
     /// A model too rich for rows that it was not fitted to.
-    RichModel,
+    Rich,
     /// A model that is still searched for: held-out rows are not looked at.
-    PresentModel,
+    Present,
     /// The model that stands.
-    JudgedModel,
+    Judged,
 }
 
 /// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time.
-pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], beside: Beside) -> Vec<ContactEvent> {
+pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], beside: ContactModel) -> Vec<ContactEvent> {
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
@@ -55,13 +55,13 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
             residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
         })
         .collect();
-    let shown: Vec<usize> = (0..rows).filter(|row| beside == Beside::JudgedModel || !problem.is_held_out(*row)).collect();
+    let shown: Vec<usize> = (0..rows).filter(|row| beside == ContactModel::Judged || !problem.is_held_out(*row)).collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
-    let least_share = if beside == Beside::RichModel { RICH_SHARE } else { SHARE };
+    let least_share = if beside == ContactModel::Rich { RICH_SHARE } else { SHARE };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..MOST {
         let free = (0..shown.len()).filter(|row| !used[*row]);

@@ -1,9 +1,9 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::Fitted;
+use super::cause::FittedNumber;
 use super::choice::CauseChoice;
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueEvidence, TorqueFinding, TorqueParameter, TorqueRival};
 use crate::diagnose::Probabilities;
 use crate::effect::Place;
@@ -29,7 +29,7 @@ pub(super) fn findings(choice: &CauseChoice, set: &[usize], held_out: &[usize]) 
 fn finding(
     choice: &CauseChoice,
     set: &[usize],
-    sweep: &Sweep,
+    sweep: &SweptColumns,
     solution: &[(usize, f64)],
     number: usize,
     held_out: &[usize],
@@ -72,10 +72,10 @@ fn finding(
 }
 
 /// Coefficients of a form with their standard deviations.
-fn fitted(problem: &TorqueProblem, sweep: &Sweep, solution: &[(usize, f64)], number: usize) -> Vec<Fitted> {
+fn fitted(problem: &TorqueProblem, sweep: &SweptColumns, solution: &[(usize, f64)], number: usize) -> Vec<FittedNumber> {
     let columns: Vec<usize> = problem.all.of(number).collect();
     let covariance = sweep.covariance(&columns);
-    let of = |(place, column): (usize, &usize)| Fitted {
+    let of = |(place, column): (usize, &usize)| FittedNumber {
         value: solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value),
         sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
     };
@@ -92,7 +92,7 @@ fn held_out_gain(problem: &TorqueProblem, without: &[(usize, f64)], solution: &[
 }
 
 /// Other names or places that explain nearly as much, the best form of each; closest first.
-fn rivals(choice: &CauseChoice, rest: &[usize], without: &Sweep, number: usize, gain: f64) -> Vec<TorqueRival> {
+fn rivals(choice: &CauseChoice, rest: &[usize], without: &SweptColumns, number: usize, gain: f64) -> Vec<TorqueRival> {
     let own = gain - choice.penalty(number, choice.form(number).width);
     let mut rivals: Vec<TorqueRival> = Vec::new();
     let others = (0..choice.open).filter(|other| choice.compete(*other, number) && choice.may_join(*other, rest));

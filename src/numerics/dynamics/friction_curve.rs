@@ -1,7 +1,7 @@
 //! Friction of a joint over its velocity, with its band.
 
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::types::FrictionCurve;
 use crate::effect::Place;
 
@@ -9,11 +9,11 @@ use crate::effect::Place;
 const POINTS: usize = 30;
 
 /// Of every joint whose set has friction.
-pub(super) fn friction_curves(problem: &TorqueProblem, set: &[usize], sweep: &Sweep) -> Vec<FrictionCurve> {
+pub(super) fn friction_curves(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns) -> Vec<FrictionCurve> {
     (0..problem.joints()).filter_map(|joint| curve(problem, set, sweep, joint)).collect()
 }
 
-fn curve(problem: &TorqueProblem, set: &[usize], sweep: &Sweep, joint: usize) -> Option<FrictionCurve> {
+fn curve(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, joint: usize) -> Option<FrictionCurve> {
     let scene = &problem.scene;
     let forms = set.iter().map(|number| (*number, &problem.all.forms[*number]));
     let own: Vec<_> =

@@ -3,7 +3,7 @@
 use super::cause::TorqueForm;
 use super::choice::CauseChoice;
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::Weighing;
 
 /// What each column of a finding must gain.
@@ -19,7 +19,7 @@ pub(super) struct JudgedSet {
 }
 
 /// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
-fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &Sweep) -> (Vec<f64>, f64) {
+fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &SweptColumns) -> (Vec<f64>, f64) {
     let solution = sweep.solution();
     let stretched = solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
     (weighing.measured(&problem.residual(&solution)).concat(), stretched)

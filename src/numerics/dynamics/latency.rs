@@ -3,7 +3,7 @@
 use super::cause::{COULOMB, OFFSET, ROTOR, VISCOUS};
 use super::problem::TorqueProblem;
 use super::rich::noise_beside;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
 
 /// s: least, most, step of the shifts that are tried.
@@ -41,7 +41,7 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
     let weighted = WeightedColumns::new(&problem.all, &problem.measured, weighing, &chosen);
     let left_at = |shift: f64| {
         let mut weighted = weighted.with_measured(weighing.measured(&problem.difference(shift)));
-        let solution = Sweep::base(&problem.all, &weighted).with(&basic).solution();
+        let solution = SweptColumns::base(&problem.all, &weighted).with(&basic).solution();
         weighted.subtract(&solution);
         weighted.measured.iter().map(|course| course.iter().map(|value| value * value).sum()).collect::<Vec<f64>>()
     };

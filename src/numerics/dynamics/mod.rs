@@ -39,7 +39,7 @@ mod unseen;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, JointMotion};
+pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use types::{
     ContactEvent, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueEvidence,
@@ -47,7 +47,7 @@ pub use types::{
 };
 
 use crate::error::{Error, Result};
-use clock::Clock;
+use clock::RecordingClock;
 
 /// What torques that come late are called.
 const LATENCY: &str = "current_latency";
@@ -72,7 +72,7 @@ pub fn diagnose(
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
     check::check(arm, recording)?;
-    let clock = Clock::of(recording);
+    let clock = RecordingClock::of(recording);
     if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
         return Err(Error::data(
             "time",

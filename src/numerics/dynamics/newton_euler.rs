@@ -13,7 +13,7 @@ pub const INERTIAL_NUMBERS: usize = 10;
 
 /// Position, velocity and acceleration of the joints in one row, length n each.
 #[derive(Clone, Copy)]
-pub struct JointMotion<'a> {
+pub struct MotionRow<'a> {
     /// rad or m.
     pub position: &'a [f64],
     /// Per s.
@@ -75,7 +75,7 @@ impl InverseDynamics {
     }
 
     /// Moves the links.
-    fn advance(&mut self, motion: JointMotion, gravity: &Vector3<f64>) {
+    fn advance(&mut self, motion: MotionRow, gravity: &Vector3<f64>) {
         let (mut spin, mut spin_change, mut acceleration) = (Vector3::zeros(), Vector3::zeros(), -gravity);
         for joint in 0..self.joints() {
             let axis = self.axes[joint];
@@ -102,7 +102,7 @@ impl InverseDynamics {
     /// The regressor of a row: `write(joint, link, numbers)` for every link and the joints up to it.
     pub fn regressor(
         &mut self,
-        motion: JointMotion,
+        motion: MotionRow,
         gravity: &Vector3<f64>,
         mut write: impl FnMut(usize, usize, &[f64; INERTIAL_NUMBERS]),
     ) {
@@ -124,7 +124,7 @@ impl InverseDynamics {
     }
 
     /// Joint torques (n) of inertial numbers `theta` (10 n) in a row.
-    pub fn torque(&mut self, motion: JointMotion, gravity: &Vector3<f64>, theta: &[f64], torque: &mut [f64]) {
+    pub fn torque(&mut self, motion: MotionRow, gravity: &Vector3<f64>, theta: &[f64], torque: &mut [f64]) {
         self.advance(motion, gravity);
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for joint in (0..self.joints()).rev() {
@@ -272,7 +272,7 @@ mod tests {
         let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
         let mut dynamics = InverseDynamics::new(&arm);
         let mut torque = [0.0; 4];
-        let motion = JointMotion { position: &q, velocity: &dq, acceleration: &ddq };
+        let motion = MotionRow { position: &q, velocity: &dq, acceleration: &ddq };
         dynamics.torque(motion, &arm.gravity, &theta, &mut torque);
         let mut by_regressor = [0.0; 4];
         dynamics.regressor(motion, &arm.gravity, |joint, link, numbers| {
@@ -318,7 +318,7 @@ mod tests {
         let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
         let (q, dq, ddq) = ([0.4, -0.9], [1.2, 0.5], [-0.8, 2.1]);
         let mut torque = [0.0; 2];
-        let motion = JointMotion { position: &q, velocity: &dq, acceleration: &ddq };
+        let motion = MotionRow { position: &q, velocity: &dq, acceleration: &ddq };
         InverseDynamics::new(&arm).torque(motion, &arm.gravity, &theta, &mut torque);
         let (s2, c2) = q[1].sin_cos();
         let (c1, c12) = (q[0].cos(), (q[0] + q[1]).cos());

@@ -9,7 +9,7 @@ use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::solve::SolvedTorques;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::types::{
     InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
 };
@@ -168,7 +168,7 @@ fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> To
     }
 }
 
-fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &Sweep, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
+fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
     const NAMES: [&str; INERTIAL_NUMBERS] = [
         "mass",
         "moment_x",

@@ -2,7 +2,7 @@
 
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::columns::TorqueColumns;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
@@ -41,7 +41,13 @@ pub(super) struct TorqueProblem<'a> {
 
 impl<'a> TorqueProblem<'a> {
     /// Of a checked recording.
-    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, question: &TorqueQuestion, clock: &Clock, cutoff: f64) -> Self {
+    pub fn new(
+        arm: &'a DynamicArm,
+        recording: &TorqueRecording,
+        question: &TorqueQuestion,
+        clock: &RecordingClock,
+        cutoff: f64,
+    ) -> Self {
         let scene = DynamicScene::new(arm, recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);

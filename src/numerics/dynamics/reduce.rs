@@ -1,6 +1,6 @@
 //! From rows as recorded to judged rows: one low-pass, alike for measured torque and every column, then fewer rows.
 
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::filter::ZeroPhase;
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ const SETTLING: f64 = 0.3;
 /// Judged rows a second over the cut-off.
 const RATE_OVER_CUTOFF: f64 = 2.5;
 /// Judged rows at most: of longer recordings fewer a second.
-const MOST: usize = 8000;
+const MOST: usize = 4000;
 /// Rows that a block of a long stretch holds, its margins apart.
 const BLOCK: usize = 1 << 14;
 
@@ -32,7 +32,7 @@ pub(super) struct Reduction {
 
 impl Reduction {
     /// Of a clock and a cut-off (Hz).
-    pub fn new(clock: &Clock, cutoff: f64) -> Self {
+    pub fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
         let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(recorded.div_ceil(MOST)).max(1);
         let settling = (SETTLING * clock.rate) as usize;

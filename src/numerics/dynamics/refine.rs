@@ -2,7 +2,7 @@
 
 use super::cause::ShapeSpan;
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 
 /// Half widths of the grids: of the logarithm, or of the number itself.
@@ -52,7 +52,7 @@ fn try_grid(
         trials.push(number);
     }
     let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
-    let sweep = Sweep::base(&problem.all, weighted).with(&rest);
+    let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
     let gain = |number: usize| sweep.gain(number).square;
     let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
     if gain(best) > gain(set[place]) + BETTER {

@@ -4,7 +4,7 @@
 
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::weighted::{Weighing, WeightedColumns};
 use crate::statistics::nearest;
 use std::ops::Range;
@@ -33,7 +33,7 @@ pub(super) fn noise_beside(problem: &TorqueProblem, forms: &[usize]) -> (Vec<Joi
     for _ in 0..ROUNDS {
         let weighing = Weighing { noise: &noise, runs: &runs };
         let weighted = WeightedColumns::new(&problem.all, &problem.measured, weighing, &chosen);
-        let sweep = Sweep::base(&problem.all, &weighted).with(forms);
+        let sweep = SweptColumns::base(&problem.all, &weighted).with(forms);
         residual = problem.residual(&sweep.solution());
         noise = residual.iter().map(|course| JointNoise::white(robust_sigma(course, &runs))).collect();
     }

@@ -1,11 +1,11 @@
 //! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
 
 use super::arm::DynamicArm;
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::derivatives::derivatives;
 use super::filter::ZeroPhase;
 use super::inertials::DeclaredInertials;
-use super::newton_euler::{InverseDynamics, JointMotion, turn};
+use super::newton_euler::{InverseDynamics, MotionRow, turn};
 use super::recording::TorqueRecording;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
@@ -41,7 +41,7 @@ pub(super) struct DynamicScene<'a> {
 
 impl<'a> DynamicScene<'a> {
     /// Of a checked recording; the final low-pass will be at `cutoff` (Hz).
-    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, clock: &Clock, cutoff: f64, free: bool) -> Self {
+    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, clock: &RecordingClock, cutoff: f64, free: bool) -> Self {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);
         let filter = ZeroPhase::new(clock.rate, (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate));
@@ -160,8 +160,8 @@ pub(super) const GRAVITY: f64 = 9.81;
 pub(super) const SIGN_WIDTHS: [f64; 6] = [0.003, 0.006, 0.012, 0.025, 0.05, 0.1];
 
 /// The parts of 3 n numbers.
-pub(super) fn split(motion: &[f64], n: usize) -> JointMotion<'_> {
-    JointMotion { position: &motion[..n], velocity: &motion[n..2 * n], acceleration: &motion[2 * n..] }
+pub(super) fn split(motion: &[f64], n: usize) -> MotionRow<'_> {
+    MotionRow { position: &motion[..n], velocity: &motion[n..2 * n], acceleration: &motion[2 * n..] }
 }
 
 /// One column of row-major values.

@@ -2,8 +2,8 @@
 
 use super::arm::DynamicArm;
 use super::choice::{CauseChoice, backward};
-use super::clock::Clock;
-use super::contact::{Beside, contacts};
+use super::clock::RecordingClock;
+use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
@@ -14,7 +14,7 @@ use super::refine::refine;
 use super::rich::{noise_beside, rich_forms};
 use super::search::search;
 use super::sign_width::sign_width;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
 
@@ -36,7 +36,7 @@ pub(super) fn solve<'a>(
     arm: &'a DynamicArm,
     recording: &TorqueRecording,
     question: &TorqueQuestion,
-    clock: &Clock,
+    clock: &RecordingClock,
     cutoff: f64,
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
@@ -52,14 +52,14 @@ pub(super) fn solve<'a>(
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
-        problem.events = contacts(&problem, &residual, &sigmas(&noise), Beside::RichModel);
+        problem.events = contacts(&problem, &residual, &sigmas(&noise), ContactModel::Rich);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
     let mut set = from_common(&problem, &weighted, question.seed);
     let before = problem.events.clone();
     if touched {
-        look_for_contacts(&mut problem, &weighted, &set, Beside::PresentModel);
+        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
     }
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
@@ -76,7 +76,7 @@ pub(super) fn solve<'a>(
         tell(told(&problem, &set));
     }
     if touched {
-        look_for_contacts(&mut problem, &weighted, &set, Beside::JudgedModel);
+        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
     }
     learn(&mut problem, &set);
     weighted = problem.weighted();
@@ -98,8 +98,8 @@ fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -
 }
 
 /// Sets rows aside in which the residual of a set looks like a push.
-fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: Beside) {
-    let solution = Sweep::base(&problem.all, weighted).with(set).solution();
+fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: ContactModel) {
+    let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
     problem.events = contacts(problem, &problem.residual(&solution), &sigmas(&problem.noise), beside);
 }
 

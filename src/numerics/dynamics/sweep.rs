@@ -20,7 +20,7 @@ pub(super) struct Gain {
 
 /// The base and a set of forms, swept out of all columns.
 #[derive(Clone)]
-pub(super) struct Sweep<'a> {
+pub(super) struct SweptColumns<'a> {
     all: &'a TorqueColumns,
     weighted: &'a WeightedColumns,
     pivots: Vec<usize>,
@@ -34,7 +34,7 @@ pub(super) struct Sweep<'a> {
     pub square: f64,
 }
 
-impl<'a> Sweep<'a> {
+impl<'a> SweptColumns<'a> {
     /// The base alone.
     pub fn base(all: &'a TorqueColumns, weighted: &'a WeightedColumns) -> Self {
         let mut sweep = Self {

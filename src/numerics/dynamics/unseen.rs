@@ -1,7 +1,7 @@
 //! What these data cannot show, a sentence each.
 
 use super::choice::CauseChoice;
-use super::sweep::Sweep;
+use super::sweep::SweptColumns;
 
 /// rad over which a joint must move for its gravity to show.
 const SMALL_RANGE: f64 = 0.2;
@@ -9,7 +9,7 @@ const SMALL_RANGE: f64 = 0.2;
 const UNSEEN: f64 = 0.5;
 
 /// Sentences on a set's problem.
-pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &Sweep) -> Vec<String> {
+pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &SweptColumns) -> Vec<String> {
     let scene = &choice.problem.scene;
     let mut sentences = Vec::new();
     if scene.declared.is_none() {
@@ -55,7 +55,7 @@ fn speeds(velocity: &[f64], width: f64) -> (f64, f64) {
 }
 
 /// Whether a form as large as a good part of the joint's torque would not be noticed.
-fn is_unseen(choice: &CauseChoice, sweep: &Sweep, number: usize) -> bool {
+fn is_unseen(choice: &CauseChoice, sweep: &SweptColumns, number: usize) -> bool {
     let problem = choice.problem;
     let column = &problem.all.columns[problem.all.of(number).start];
     let largest = column.courses.iter().flatten().map(|value| value.abs()).fold(0.0, f64::max);

@@ -1,6 +1,6 @@
 //! Friction that is greater in one direction of motion.
 
-use super::{COULOMB, Fitted, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -37,11 +37,11 @@ impl TorqueCause for Asymmetric {
         Some(sign.max(0.0))
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("asymmetry", fitted[0], "Nm")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("friction of {} is {:.3} Nm greater in its positive direction", form.place, fitted[0].value)
     }
 }

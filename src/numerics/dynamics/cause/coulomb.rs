@@ -1,6 +1,6 @@
 //! Friction of one size against the direction of motion.
 
-use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -36,11 +36,11 @@ impl TorqueCause for Coulomb {
         Some(sign)
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("coulomb", fitted[0], "Nm")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("{} has Coulomb friction of {:.3} Nm", form.place, fitted[0].value)
     }
 }

@@ -1,6 +1,6 @@
 //! A joint that swings: its torque is that of the rigid arm behind a resonance.
 
-use super::{Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
@@ -64,11 +64,11 @@ impl TorqueCause for Elasticity {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![shape("resonance", form.shape[0], "Hz"), shape("damping", form.shape[1], "1"), plain("share", fitted[0], "1")]
     }
 
-    fn statement(&self, form: &TorqueForm, _fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {
         let [hertz, damping] = [form.shape[0], form.shape[1]];
         format!("{} swings at {hertz:.1} Hz with a damping ratio of {damping:.2}", form.place)
     }

@@ -1,6 +1,6 @@
 //! A base that does not stand as declared.
 
-use super::{Fitted, TorqueCause, TorqueForm, shape};
+use super::{FittedNumber, TorqueCause, TorqueForm, shape};
 use crate::dynamics::scene::{DynamicScene, GRAVITY};
 use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
@@ -38,7 +38,7 @@ impl TorqueCause for GravityDirection {
         out.copy_from_slice(&scene.sideways[column][joint]);
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let (angle, sigma) = tilt(fitted);
         vec![
             TorqueParameter { name: "tilt".into(), value: angle.to_degrees(), unit: "deg", sigma: Some(sigma.to_degrees()) },
@@ -46,7 +46,7 @@ impl TorqueCause for GravityDirection {
         ]
     }
 
-    fn statement(&self, _form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let azimuth = fitted[1].value.atan2(fitted[0].value).to_degrees();
         let side = GRAVITY * fitted[0].value.hypot(fitted[1].value);
         format!(
@@ -57,7 +57,7 @@ impl TorqueCause for GravityDirection {
 }
 
 /// rad, with its standard deviation.
-fn tilt(fitted: &[Fitted]) -> (f64, f64) {
+fn tilt(fitted: &[FittedNumber]) -> (f64, f64) {
     let side = fitted[0].value.hypot(fitted[1].value);
     let sigma = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma) / side.max(f64::MIN_POSITIVE);
     (side.min(1.0).asin(), sigma)

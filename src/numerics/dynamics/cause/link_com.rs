@@ -1,6 +1,6 @@
 //! A link whose centre of mass is elsewhere.
 
-use super::{Fitted, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -8,18 +8,18 @@ use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
 /// Displacement of the centre, in three coordinates.
-pub(super) struct LinkCom;
+pub(super) struct WrongLinkCentre;
 
 const WIDTH: usize = 3;
 
-impl TorqueCause for LinkCom {
+impl TorqueCause for WrongLinkCentre {
     fn name(&self) -> &'static str {
         "link_com"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&LinkCom, link, WIDTH) };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&WrongLinkCentre, link, WIDTH) };
         (0..links).map(form).collect()
     }
 
@@ -43,12 +43,12 @@ impl TorqueCause for LinkCom {
         Some(declared.centre_shift[form.link()].iter().map(|ten| (form.link(), *ten)).collect())
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
-        let in_mm = |number: &Fitted| Fitted { value: 1e3 * number.value, sigma: 1e3 * number.sigma };
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+        let in_mm = |number: &FittedNumber| FittedNumber { value: 1e3 * number.value, sigma: 1e3 * number.sigma };
         ["centre_x", "centre_y", "centre_z"].iter().zip(fitted).map(|(name, number)| plain(name, in_mm(number), "mm")).collect()
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [x, y, z] = [0, 1, 2].map(|axis| 1e3 * fitted[axis].value);
         format!("the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared", form.place)
     }

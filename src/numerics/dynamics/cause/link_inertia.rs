@@ -1,6 +1,6 @@
 //! A link whose inertia is not the declared one.
 
-use super::{Fitted, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -8,18 +8,18 @@ use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
 /// Six numbers about the joint's point.
-pub(super) struct LinkInertia;
+pub(super) struct WrongLinkInertia;
 
 const WIDTH: usize = 6;
 
-impl TorqueCause for LinkInertia {
+impl TorqueCause for WrongLinkInertia {
     fn name(&self) -> &'static str {
         "link_inertia"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&LinkInertia, link, WIDTH) };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&WrongLinkInertia, link, WIDTH) };
         (0..links).map(form).collect()
     }
 
@@ -44,12 +44,12 @@ impl TorqueCause for LinkInertia {
         Some((0..WIDTH).map(|number| (form.link(), unit(number))).collect())
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let names = ["inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy", "inertia_yz", "inertia_zz"];
         names.iter().zip(fitted).map(|(name, value)| plain(name, *value, "kg m2")).collect()
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let largest = fitted.iter().map(|number| number.value).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
         format!("the inertia of {} is off, by up to {largest:.3} kg m2", form.place)
     }

@@ -1,6 +1,6 @@
 //! A link that is heavier or lighter than declared.
 
-use super::{Fitted, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -8,18 +8,18 @@ use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
 /// All its numbers in proportion.
-pub(super) struct LinkMass;
+pub(super) struct WrongLinkMass;
 
 const WIDTH: usize = 1;
 
-impl TorqueCause for LinkMass {
+impl TorqueCause for WrongLinkMass {
     fn name(&self) -> &'static str {
         "link_mass"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&LinkMass, link, WIDTH) };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&WrongLinkMass, link, WIDTH) };
         (0..links).map(form).collect()
     }
 
@@ -44,11 +44,11 @@ impl TorqueCause for LinkMass {
         Some(vec![(form.link(), std::array::from_fn(|number| own[number]))])
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("relative", fitted[0], "1")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("{} weighs {:+.1} % against what is declared", form.place, 100.0 * fitted[0].value)
     }
 }

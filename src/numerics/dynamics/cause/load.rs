@@ -1,19 +1,19 @@
 //! Friction that grows with the torque that a gear transmits.
 
-use super::{COULOMB, Fitted, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// Friction that grows with the torque that a gear transmits.
-pub(super) struct Load;
+pub(super) struct LoadFriction;
 
-impl TorqueCause for Load {
+impl TorqueCause for LoadFriction {
     fn name(&self) -> &'static str {
         "load_friction"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint(&Load, scene, 1)
+        at_each_joint(&LoadFriction, scene, 1)
     }
 
     fn price(&self, _form: &TorqueForm) -> f64 {
@@ -41,11 +41,11 @@ impl TorqueCause for Load {
         fill(out, |row| scene.sign(scene.velocity[joint][row]) * scene.rigid[joint][row].abs());
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("share", fitted[0], "1")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("{} loses {:.1} % of the torque that it transmits to friction", form.place, 100.0 * fitted[0].value)
     }
 }

@@ -42,8 +42,8 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &offset::Offset,
     &asymmetric::Asymmetric,
     &stribeck::Stribeck,
-    &presliding::Presliding,
-    &load::Load,
+    &presliding::PreslidingFriction,
+    &load::LoadFriction,
     &warmup::Warmup,
     &rotor::Rotor,
     &torque_constant::TorqueConstant,
@@ -54,9 +54,9 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &spikes::Spikes,
     &wrist_coupling::WristCoupling,
     &payload::Payload,
-    &link_mass::LinkMass,
-    &link_com::LinkCom,
-    &link_inertia::LinkInertia,
+    &link_mass::WrongLinkMass,
+    &link_com::WrongLinkCentre,
+    &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
     &unknown::Unnamed,
 ];
@@ -129,14 +129,14 @@ pub(super) trait TorqueCause: Sync {
         None
     }
     /// Its numbers as people read them.
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter>;
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter>;
     /// A sentence without a full stop, with its size.
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String;
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String;
 }
 
 /// A coefficient and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fitted {
+pub(super) struct FittedNumber {
     pub value: f64,
     pub sigma: f64,
 }
@@ -186,7 +186,7 @@ impl TorqueForm {
 }
 
 /// A parameter that is one coefficient.
-fn plain(name: &str, fitted: Fitted, unit: &'static str) -> TorqueParameter {
+fn plain(name: &str, fitted: FittedNumber, unit: &'static str) -> TorqueParameter {
     TorqueParameter { name: name.into(), value: fitted.value, unit, sigma: Some(fitted.sigma) }
 }
 

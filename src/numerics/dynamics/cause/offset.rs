@@ -1,6 +1,6 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -33,11 +33,11 @@ impl TorqueCause for Offset {
         out.fill(1.0);
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("offset", fitted[0], "Nm")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("the torque of {} reads {:.3} Nm too much, whatever it does", form.place, fitted[0].value)
     }
 }

@@ -1,6 +1,6 @@
 //! A payload that is not the declared one.
 
-use super::{Fitted, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -59,14 +59,14 @@ impl TorqueCause for Payload {
         Some((0..form.width).map(|number| (last, column(number))).collect())
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let mut all = vec![plain("mass", fitted[0], "kg")];
         // What a payload without its mass would be at: the moment that is found, of all the mass that is there.
         let whole = (form.shape[0] + fitted[0].value).abs().max(LIGHTEST);
         for (name, number) in
             ["centre_x", "centre_y", "centre_z"].iter().zip(&fitted[1..]).filter(|_| form.width < INERTIAL_NUMBERS)
         {
-            all.push(plain(name, Fitted { value: 1e3 * number.value / whole, sigma: 1e3 * number.sigma / whole }, "mm"));
+            all.push(plain(name, FittedNumber { value: 1e3 * number.value / whole, sigma: 1e3 * number.sigma / whole }, "mm"));
         }
         if form.width == INERTIAL_NUMBERS {
             all.extend(
@@ -79,7 +79,7 @@ impl TorqueCause for Payload {
         all
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let mass = fitted[0].value;
         let more = if mass >= 0.0 { "more" } else { "less" };
         let centre = if form.width > 1 { ", its centre elsewhere" } else { "" };

@@ -1,11 +1,11 @@
 //! Friction that turns with the direction of motion only after a travel, and is kept at rest.
 
-use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968).
-pub(super) struct Presliding;
+pub(super) struct PreslidingFriction;
 
 /// rad: the one that stands in the rich model, and all that are tried.
 const USUAL: f64 = 0.004;
@@ -13,13 +13,13 @@ const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL], &[0.01], &[0.025]]
 /// rad/s below which a joint is at rest.
 const REST: f64 = 2e-3;
 
-impl TorqueCause for Presliding {
+impl TorqueCause for PreslidingFriction {
     fn name(&self) -> &'static str {
         "presliding_friction"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint_with(&Presliding, scene, 1, &TRAVELS)
+        at_each_joint_with(&PreslidingFriction, scene, 1, &TRAVELS)
     }
 
     fn price(&self, _form: &TorqueForm) -> f64 {
@@ -56,11 +56,11 @@ impl TorqueCause for Presliding {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("kept", fitted[0], "Nm"), shape("travel", form.shape[0], "rad")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, travel] = [fitted[0].value, form.shape[0]];
         format!("friction of {} turns over a travel of {travel:.2e} rad and is kept at rest, {value:.3} Nm of it", form.place)
     }

@@ -1,6 +1,6 @@
 //! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
 
-use super::{Fitted, TorqueCause, TorqueForm, fill, shape};
+use super::{FittedNumber, TorqueCause, TorqueForm, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -61,7 +61,7 @@ impl TorqueCause for Ripple {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let (amplitude, sigma) = amplitude(fitted);
         let of = if form.with[1] == 1 { "motor_order" } else { "order" };
         vec![
@@ -71,7 +71,7 @@ impl TorqueCause for Ripple {
         ]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let of = if form.with[1] == 1 { "its motor" } else { "the joint" };
         let (amplitude, _) = amplitude(fitted);
         format!("the torque of {} ripples by {amplitude:.3} Nm, {} times a turn of {of}", form.place, form.with[0])
@@ -79,7 +79,7 @@ impl TorqueCause for Ripple {
 }
 
 /// Of a cosine and a sine, with its standard deviation.
-fn amplitude(fitted: &[Fitted]) -> (f64, f64) {
+fn amplitude(fitted: &[FittedNumber]) -> (f64, f64) {
     let amplitude = fitted[0].value.hypot(fitted[1].value);
     let weighted = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma);
     (amplitude, weighted / amplitude.max(f64::MIN_POSITIVE))

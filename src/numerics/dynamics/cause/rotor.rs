@@ -1,6 +1,6 @@
 //! Inertia of a motor and its gear, as the joint feels it.
 
-use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -40,11 +40,11 @@ impl TorqueCause for Rotor {
         out.copy_from_slice(&scene.acceleration[joint]);
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("inertia", fitted[0], "kg m2")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("the rotor of {} adds an inertia of {:.4} kg m2 at the joint", form.place, fitted[0].value)
     }
 }

@@ -1,6 +1,6 @@
 //! Lost motion: a knock after each reversal of a joint.
 
-use super::{Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -56,11 +56,11 @@ impl TorqueCause for Spikes {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("height", fitted[0], "Nm"), shape("time", form.shape[0], "s")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, time] = [fitted[0].value, form.shape[0]];
         format!("each reversal of {} knocks with {value:.3} Nm, {time:.3} s later: lost motion", form.place)
     }

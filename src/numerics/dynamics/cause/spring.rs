@@ -1,23 +1,23 @@
 //! Torque that grows with the angle of a joint: a balancing spring at joint 2, a cable or hose elsewhere.
 
-use super::{Fitted, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// q and 1.
-pub(super) struct Spring {
+pub(super) struct SpringTorque {
     name: &'static str,
     balances: bool,
 }
 
 /// At the joint that arms balance.
-pub(super) static SPRING_BALANCE: Spring = Spring { name: "spring_balance", balances: true };
+pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: "spring_balance", balances: true };
 /// At the others.
-pub(super) static CABLE_STIFFNESS: Spring = Spring { name: "cable_stiffness", balances: false };
+pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { name: "cable_stiffness", balances: false };
 /// From 0.
 const BALANCED: usize = 1;
 
-impl TorqueCause for Spring {
+impl TorqueCause for SpringTorque {
     fn name(&self) -> &'static str {
         self.name
     }
@@ -39,11 +39,11 @@ impl TorqueCause for Spring {
         }
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("stiffness", fitted[0], "Nm/rad"), plain("at_zero", fitted[1], "Nm")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let what = if self.balances { "a balancing spring" } else { "a cable or hose" };
         format!("{what} acts on {} with {:.3} Nm/rad and {:.3} Nm at zero", form.place, fitted[0].value, fitted[1].value)
     }

@@ -1,6 +1,6 @@
 //! Friction that is greater at low speed and falls as the joint gets faster.
 
-use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -45,11 +45,11 @@ impl TorqueCause for Stribeck {
         Some(sign * (-velocity.abs() / form.shape[0]).exp())
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("stribeck", fitted[0], "Nm"), shape("speed", form.shape[0], "rad/s")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, speed] = [fitted[0].value, form.shape[0]];
         format!("friction of {} is {value:.3} Nm greater when it begins to move, which falls over {speed:.3} rad/s", form.place)
     }

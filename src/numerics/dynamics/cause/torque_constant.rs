@@ -1,6 +1,6 @@
 //! A current that stands for another torque than declared.
 
-use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -38,11 +38,11 @@ impl TorqueCause for TorqueConstant {
         out.copy_from_slice(&scene.rigid[joint]);
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("relative", fitted[0], "1")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!(
             "torques of {} read {:+.1} % off: its torque constant is not the declared one",
             form.place,

@@ -1,6 +1,6 @@
 //! What has no name: a smooth torque at a joint, in the angles of two joints.
 
-use super::{Fitted, TorqueCause, TorqueForm, fill, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -50,12 +50,12 @@ impl TorqueCause for Unnamed {
         }
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         let names = ["sin_sin", "sin_cos", "cos_sin", "cos_cos"];
         names.iter().zip(fitted).map(|(name, value)| plain(name, *value, "Nm")).collect()
     }
 
-    fn statement(&self, form: &TorqueForm, _fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {
         let [first, second] = form.with.map(|joint| joint + 1);
         format!("something without a name acts at {}; it depends on the angles of joint {first} and joint {second}", form.place)
     }

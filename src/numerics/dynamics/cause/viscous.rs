@@ -1,6 +1,6 @@
 //! Friction that grows with the velocity of a joint.
 
-use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -36,11 +36,11 @@ impl TorqueCause for Viscous {
         Some(velocity)
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![plain("viscous", fitted[0], "Nm s/rad")]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         format!("{} has viscous friction of {:.3} Nm s/rad", form.place, fitted[0].value)
     }
 }

@@ -1,6 +1,6 @@
 //! Friction that falls while the gear warms up.
 
-use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -54,7 +54,7 @@ impl TorqueCause for Warmup {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![
             plain("viscous_cold", fitted[0], "Nm s/rad"),
             plain("coulomb_cold", fitted[1], "Nm"),
@@ -62,7 +62,7 @@ impl TorqueCause for Warmup {
         ]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [viscous, coulomb, time] = [fitted[0].value, fitted[1].value, form.shape[0]];
         format!("friction of {} begins {coulomb:.3} Nm and {viscous:.3} Nm s/rad higher and falls over {time:.1} s", form.place)
     }

@@ -1,6 +1,6 @@
 //! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
 
-use super::{Fitted, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -66,7 +66,7 @@ impl TorqueCause for WristCoupling {
         }
     }
 
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
         vec![
             plain("viscous", fitted[0], "Nm s/rad"),
             plain("coulomb", fitted[1], "Nm"),
@@ -75,7 +75,7 @@ impl TorqueCause for WristCoupling {
         ]
     }
 
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let (by, ratio) = (form.with[0] + 1, form.shape[0]);
         let [viscous, coulomb] = [fitted[0].value, fitted[1].value];
         format!(
