@@ -3,7 +3,11 @@
 use crate::error::{Error, Result, nearest};
 use crate::pipeline::{Manifest, StageReport, StageStatus, find_run};
 use crate::shell::typed;
+use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
+
+/// Stages that diagnose positions.
+pub const POSITIONS: [&str; 1] = [Diagnose::NAME];
 
 /// A run by its name, and its stage that diagnoses, one of the kinds `uses`: `step` where it has several. Fails with what to type where
 /// there is none.

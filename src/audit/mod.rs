@@ -9,7 +9,7 @@ mod query;
 mod runs;
 mod tables;
 
-pub use diagnosis::{diagnosis, the_stage};
+pub use diagnosis::{POSITIONS, diagnosis, the_stage};
 pub use explain::{Explanation, explain};
 pub use keep::kept_actions;
 pub use lineage::{LineageNode, Provenance, lineage};

@@ -4,7 +4,7 @@ mod show;
 
 use super::site::site;
 use super::{PoseRequest, wish};
-use crate::audit::diagnosis;
+use crate::audit::{POSITIONS, diagnosis};
 use crate::description::RobotDescription;
 use crate::diagnose::{DiagnosedModel, contest};
 use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place, cause};
@@ -13,7 +13,6 @@ use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, 
 use crate::identified::convention_of;
 use crate::pipeline::StageReport;
 use crate::robot::{JointConvention, Measurements, RobotModel};
-use crate::stage::{Diagnose, Stage};
 use crate::store::{Store, TableRef};
 use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
 use nalgebra::Vector3;
@@ -52,7 +51,7 @@ pub struct RunStage<'a> {
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
 pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
-    let (manifest, stage) = diagnosis(store, of.run, of.step, &[Diagnose::NAME])?;
+    let (manifest, stage) = diagnosis(store, of.run, of.step, &POSITIONS)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
     let rivals: Rivals = written(store, &stage)?;

@@ -5,8 +5,8 @@ use crate::error::{Error, Fault, Result, counted};
 use crate::stage::dynamic_arm::{dynamic_arm, torque_per_ampere};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{
-    Contacts, FrictionCurves, Inertials, JointTorques, Motion, Robot, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict,
+    ArmMotion, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueFindings, TorqueNumbers,
+    TorqueRivals, TorqueVerdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,7 +66,7 @@ reads! {
     /// Input ports of [`DiagnoseTorques`].
     pub struct DiagnoseTorquesReads {
         robot: Robot,
-        motion: Motion,
+        motion: ArmMotion,
     }
 }
 writes! {
@@ -161,7 +161,7 @@ impl Stage for DiagnoseTorques {
 
 impl DiagnoseTorques {
     /// Which rows judge in the end. Fails where none is left to fit.
-    fn held_out(&self, motion: &Motion, context: &Context) -> Result<Vec<bool>> {
+    fn held_out(&self, motion: &ArmMotion, context: &Context) -> Result<Vec<bool>> {
         let rows = motion.rows();
         let last = |share: f64| {
             let first = rows - (share * rows as f64).round() as usize;

@@ -120,7 +120,7 @@ pub use inertials::{InertialRow, Inertials};
 pub use intake::{Intake, IntakeRow};
 pub use joint_torques::{JointTorqueRow, JointTorques};
 pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
-pub use motion::Motion;
+pub use motion::ArmMotion;
 pub use network::{Network, NetworkRow};
 pub use observability::{FitContext, Observability, ObservabilityRow, UNFOLDED};
 pub use parameters::{Corrected, ParameterRow, Parameters};
@@ -161,7 +161,7 @@ pub const TABLES: &[&str] = &[
     Inertials::KIND,
     Intake::KIND,
     JointTorques::KIND,
-    Motion::KIND,
+    ArmMotion::KIND,
     Network::KIND,
     Observability::KIND,
     Parameters::KIND,

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Motion {
+pub struct ArmMotion {
     /// Joints of the arm.
     pub joints: usize,
     /// Which joints are prismatic.
@@ -20,7 +20,7 @@ pub struct Motion {
     pub trajectory: Vec<i64>,
     /// What rows may be for.
     pub usages: Vec<String>,
-    /// Which of [`Motion::usages`] a row is for; none where the recording says nothing.
+    /// Which of [`ArmMotion::usages`] a row is for; none where the recording says nothing.
     pub usage: Vec<Option<u16>>,
     /// s, ascending in a trajectory.
     pub time: Vec<f64>,
@@ -80,14 +80,14 @@ impl PerJoint {
     }
 }
 
-impl Motion {
+impl ArmMotion {
     /// How many rows.
     pub fn rows(&self) -> usize {
         self.sequence.len()
     }
 }
 
-impl Table for Motion {
+impl Table for ArmMotion {
     const KIND: &'static str = "motion";
 
     fn to_frame(&self) -> Result<Frame> {

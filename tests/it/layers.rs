@@ -8,7 +8,7 @@ use crate::source::{Source, sources, uses};
 
 /// What every layer may use without saying so.
 const FREE: [&str; 3] = ["error", "units", "statistics"];
-const NUMERICS: [&str; 7] = ["description", "spatial", "robot", "effect", "observation", "estimate", "diagnose"];
+const NUMERICS: [&str; 8] = ["description", "spatial", "robot", "effect", "observation", "estimate", "diagnose", "dynamics"];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")

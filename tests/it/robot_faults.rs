@@ -53,7 +53,7 @@ fn an_unknown_key_names_the_nearest() {
     assert_eq!(
         added("payloda: {mass: 3}"),
         "robot.yaml:8:1: payloda: unknown key; did you mean `payload`? Allowed: calib_robot, name, about, units, kinematics, tool, joints, \
-         couplings, links, payload, gravity"
+         couplings, links, payload, mass_tolerance, gravity"
     );
 }
 

@@ -29,8 +29,9 @@ fn every_stage_is_registered_once_and_documented() {
 
 #[test]
 fn every_file_with_a_stage_is_in_the_list() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/stage");
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    let folders = ["src/stage", "src/stage/ingest"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    let entries = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let files = entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
     let stages = files.filter(|path| std::fs::read_to_string(path).unwrap().contains("\nimpl Stage for ")).count();
     assert_eq!(stages, STAGES.len(), "a stage is missing in STAGES (src/stage/mod.rs)");
 }

@@ -4,7 +4,7 @@ mod concealed;
 mod hostile;
 
 use crate::desk::shared;
-use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, JointMotion};
+use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueFile};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -136,7 +136,7 @@ fn torques_of_the_twin_are_those_of_the_estimators_inverse_dynamics() {
         let gravity = arm.gravity;
         for (state, torque) in case.rigid() {
             let mut own = vec![0.0; torque.len()];
-            let motion = JointMotion { position: &state.q, velocity: &state.v, acceleration: &state.a };
+            let motion = MotionRow { position: &state.q, velocity: &state.v, acceleration: &state.a };
             dynamics.torque(motion, &gravity, &theta, &mut own);
             let largest = torque.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
             for (one, other) in own.iter().zip(&torque) {

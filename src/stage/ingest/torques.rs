@@ -13,7 +13,7 @@ use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
-use crate::table::{Intake, IntakeRow, Motion, Rejected, RejectedRow, Robot, Table};
+use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -67,7 +67,7 @@ reads! {
 writes! {
     /// Output ports of `ingest_torques`.
     pub struct IngestTorquesWrites {
-        motion: StreamedTable<Motion>,
+        motion: StreamedTable<ArmMotion>,
         rejected: StreamedTable<Rejected>,
         intake: Intake,
     }
@@ -149,7 +149,7 @@ struct MotionRows<'a> {
     settings: &'a IngestTorques,
     arm: &'a RobotJoints,
     sink: Box<dyn Sink + 'a>,
-    chunk: Motion,
+    chunk: ArmMotion,
     written: i64,
     stretches: Stretches,
     /// What a motor-side torque is multiplied by, a joint each.
@@ -178,8 +178,8 @@ impl<'a> MotionRows<'a> {
         Ok(Self {
             settings,
             arm,
-            sink: context.services.sink(Motion::KIND)?,
-            chunk: Motion::default(),
+            sink: context.services.sink(ArmMotion::KIND)?,
+            chunk: ArmMotion::default(),
             written: 0,
             stretches: Stretches::new(),
             ratio: ratio.collect::<Result<_>>()?,
@@ -339,11 +339,11 @@ impl<'a> MotionRows<'a> {
     }
 
     fn flush(&mut self) -> Result<()> {
-        let next = Motion {
+        let next = ArmMotion {
             usages: self.chunk.usages.clone(),
             velocity: self.chunk.velocity.as_ref().map(|_| Vec::new()),
             temperature: self.chunk.temperature.as_ref().map(|_| Vec::new()),
-            ..Motion::default()
+            ..ArmMotion::default()
         };
         let mut full = std::mem::replace(&mut self.chunk, next);
         full.joints = self.arm.joints();
@@ -369,7 +369,7 @@ impl<'a> MotionRows<'a> {
         Err(Error::data(format!("{label}:{line}"), message))
     }
 
-    fn finish(mut self, context: &Context) -> Result<StreamedTable<Motion>> {
+    fn finish(mut self, context: &Context) -> Result<StreamedTable<ArmMotion>> {
         let signal = self.signal.unwrap_or("torque");
         let dead: Vec<Fault> = (1..)
             .zip(&self.channels)

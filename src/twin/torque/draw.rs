@@ -2,7 +2,6 @@
 
 use super::law::Law;
 use super::path::Path;
-use super::record::TorqueRows;
 use super::rigid::{Body, Machine};
 use crate::conceal::robots::Kind;
 use crate::matrix::{self, Vector};
@@ -104,7 +103,7 @@ impl TorqueCase {
             robot,
         };
         let rows = case.rows(&[]);
-        let peak = peaks(&rows, n);
+        let peak = peaks(&rows.rigid, n);
         let most = peak.iter().copied().fold(0.0, f64::max);
         let level = noise.uniform(0.7, 1.4);
         case.white = peak.iter().map(|peak| level * (0.01 * peak + 0.001 * most)).collect();
@@ -333,7 +332,7 @@ fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) 
 }
 
 /// Largest rigid torque of each joint, Nm.
-fn peaks(rows: &TorqueRows, joints: usize) -> Vec<f64> {
-    let of_joint = |joint: usize| rows.rigid.iter().skip(joint).step_by(joints).fold(0.0, |most: f64, x| most.max(x.abs()));
+fn peaks(rigid: &[f64], joints: usize) -> Vec<f64> {
+    let of_joint = |joint: usize| rigid.iter().skip(joint).step_by(joints).fold(0.0, |most: f64, x| most.max(x.abs()));
     (0..joints).map(of_joint).collect()
 }
