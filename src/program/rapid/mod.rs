@@ -14,7 +14,7 @@ use super::{DEPTH, Gathered, Language, quoted};
 use list::{List, Want};
 pub(super) use listed::listed;
 use std::collections::BTreeMap;
-use surroundings::Surroundings;
+use surroundings::DeclaredSurroundings;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -72,7 +72,7 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
             }
         }
     }
-    let surroundings = Surroundings::of(source, &statements);
+    let surroundings = DeclaredSurroundings::of(source, &statements);
     let mut reader = Reader { source, types, surroundings, found };
     for statement in statements {
         reader.statement(statement);
@@ -156,7 +156,7 @@ struct Reader<'p> {
     source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
-    surroundings: Surroundings,
+    surroundings: DeclaredSurroundings,
     found: Gathered,
 }
 
