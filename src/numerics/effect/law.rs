@@ -191,7 +191,9 @@ links:
     fn every_law_holds_at_the_ends_of_what_was_fitted_and_says_how_far_beyond_it_is() {
         let curve = |[low, high]: [f64; 2]| Basis::Cosines { low, high, count: 6 };
         let line = |_: [f64; 2]| Basis::PROPORTIONAL;
-        let variables: [(Variable, [f64; 2], fn(f64) -> (f64, [f64; 3])); 5] = [
+        /// Angle, and payload, temperature and time, of a row at a value of the variable.
+        type Row = fn(f64) -> (f64, [f64; 3]);
+        let variables: [(Variable, [f64; 2], Row); 5] = [
             (Variable::Angle { joint: 1 }, [-0.4, 0.6], |u| (u, [0.0; 3])),
             (Variable::Payload, [1.0, 9.0], |u| (0.0, [u, 0.0, 0.0])),
             (Variable::Temperature, [20.0, 30.0], |u| (0.0, [0.0, u, 0.0])),
