@@ -21,7 +21,7 @@
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
-//! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot |
+//! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, observation, robot, spatial |
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, estimate, spatial |
@@ -30,7 +30,7 @@
 //! | [`diff`] | two tables or two runs compared | raw, store |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | program, raw, report, table, numerics, twin, yaml |
+//! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
 //! | [`export`] | the identified model for other programs, one file per format | compensate, effect, estimate, identified, robot, yaml |

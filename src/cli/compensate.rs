@@ -85,7 +85,8 @@ pub(super) struct CompensateArguments {
     /// Temperature where the targets do not say, C [default: that at the start of the recording]
     #[arg(long, value_name = "C", allow_hyphen_values = true)]
     temperature: Option<f64>,
-    /// Time on the recording's clock, s, where it has one [default: long after it: steps have happened, the arm is warm]
+    /// Time on the recording's clock, s, where it has one [default: later than all of it: steps have happened, the arm is warm,
+    /// laws over time are what they were last, and targets say so]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Side from which all joints come to rest, 1 or -1 [default: by the order of the targets]

@@ -1,6 +1,6 @@
 //! Laws: a basis of a variable, or the product of two.
 
-use super::{ArmState, Basis, Variable};
+use super::{ArmState, Basis, LONG_AFTER, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
@@ -39,10 +39,10 @@ impl Factor {
     }
 
     /// The variable, where nothing more was seen at the place where the functions are held. A law of few numbers goes on for a while, but
-    /// not in time: what was seen last is the best that is known of later.
+    /// not to a time that nobody states: what was seen last is the best that is known of that.
     fn held(&self, u: f64) -> f64 {
         let Some([low, high]) = self.within else { return u };
-        let ends = self.basis.is_curve() || self.of == Variable::Time;
+        let ends = self.basis.is_curve() || (self.of == Variable::Time && u >= LONG_AFTER);
         let further = if ends { 0.0 } else { FURTHER * (high - low) };
         u.clamp(low - further, high + further)
     }
@@ -191,7 +191,9 @@ links:
     fn every_law_holds_at_the_ends_of_what_was_fitted_and_says_how_far_beyond_it_is() {
         let curve = |[low, high]: [f64; 2]| Basis::Cosines { low, high, count: 6 };
         let line = |_: [f64; 2]| Basis::PROPORTIONAL;
-        let variables: [(Variable, [f64; 2], fn(f64) -> (f64, [f64; 3])); 5] = [
+        /// Angle, and payload, temperature and time, of a row at a value of the variable.
+        type Row = fn(f64) -> (f64, [f64; 3]);
+        let variables: [(Variable, [f64; 2], Row); 5] = [
             (Variable::Angle { joint: 1 }, [-0.4, 0.6], |u| (u, [0.0; 3])),
             (Variable::Payload, [1.0, 9.0], |u| (0.0, [u, 0.0, 0.0])),
             (Variable::Temperature, [20.0, 30.0], |u| (0.0, [0.0, u, 0.0])),
@@ -200,7 +202,7 @@ links:
         ];
         for (of, within, row) in variables {
             let span = within[1] - within[0];
-            for (basis, further) in [(curve(within), 0.0), (line(within), if of == Variable::Time { 0.0 } else { FURTHER })] {
+            for (basis, further) in [(curve(within), 0.0), (line(within), FURTHER)] {
                 let factor = Factor::new(of, basis).held_within(within);
                 let see = |u: f64| {
                     let (angle, rest) = row(u);
@@ -222,5 +224,7 @@ links:
         assert_eq!(share(Basis::After { at: 500.0 }), 0.0);
         assert!((share(Basis::Settling { start: 0.0, constant: 200.0 }) - (-5.0f64).exp()).abs() < 1e-12);
         assert!(share(Basis::Settling { start: 0.0, constant: 2000.0 }) > 0.6);
+        let drift = Factor::new(Variable::Time, Basis::PROPORTIONAL).held_within([0.0, 1000.0]);
+        assert_eq!(at(&drift, 0.0, [0.0, 0.0, LONG_AFTER]), (at(&drift, 0.0, [0.0, 0.0, 1000.0]).0, 1.0));
     }
 }

@@ -3,10 +3,10 @@
 use super::super::Gathered;
 use super::super::token::{ProgramText, Token};
 use super::line::member;
-use super::surroundings::Surroundings;
+use super::surroundings::SetSurroundings;
 
 /// What a line sets that calib takes for granted.
-pub(super) fn set(source: ProgramText, line: &[Token], known: &Surroundings, found: &mut Gathered) {
+pub(super) fn set(source: ProgramText, line: &[Token], known: &SetSurroundings, found: &mut Gathered) {
     for (k, token) in line.iter().enumerate() {
         let names = ["$BASE", "$TOOL", "$IPO_MODE", "$ROBROOT"];
         if source.is_word(token, &names) && member(source, &line[k + 1..]).is_some_and(|(_, rest)| rest.is_some()) {
@@ -26,7 +26,7 @@ pub(super) fn set(source: ProgramText, line: &[Token], known: &Surroundings, fou
 }
 
 /// The data of an inline form: which base its point is taught in.
-pub(super) fn of_point(source: ProgramText, tokens: &[Token], known: &Surroundings, found: &mut Gathered) {
+pub(super) fn of_point(source: ProgramText, tokens: &[Token], known: &SetSurroundings, found: &mut Gathered) {
     let base = tokens.windows(2).find(|w| source.is_word(&w[0], &["BASE_NO"]));
     if base.and_then(|w| source.number(&w[1..])).is_some_and(|(number, _)| number != 0.0) && !known.applies("$BASE") {
         found.frame(tokens[0].span.start, assumed("$BASE"));

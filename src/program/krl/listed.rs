@@ -5,7 +5,7 @@ use super::super::{Declared, Gathered, Language};
 use super::Reader;
 use super::aggregate::{Aggregate, Type};
 use super::line::{closing, declared, variable};
-use super::surroundings::Surroundings;
+use super::surroundings::SetSurroundings;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(in crate::program) fn listed(bytes: &[u8]) -> Declared {
@@ -13,7 +13,7 @@ pub(in crate::program) fn listed(bytes: &[u8]) -> Declared {
     let source = ProgramText { bytes, language: Language::Krl };
     let tokens = tokens(source, &mut found);
     let mut reader =
-        Reader { source, types: BTreeMap::new(), structures: BTreeSet::new(), surroundings: Surroundings::default(), found };
+        Reader { source, types: BTreeMap::new(), structures: BTreeSet::new(), surroundings: SetSurroundings::default(), found };
     let (mut names, mut poses) = (Vec::new(), 0);
     for line in tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()) {
         let declares = declared(source, line).map(|(kind, _)| kind);

@@ -17,7 +17,7 @@ use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
 pub(super) use listed::listed;
 use std::collections::{BTreeMap, BTreeSet};
-use surroundings::Surroundings;
+use surroundings::SetSurroundings;
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
@@ -53,7 +53,7 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
         }
     }
     let structures = lines.iter().filter_map(|line| structure(source, line)).collect();
-    let surroundings = Surroundings::of(source, &lines);
+    let surroundings = SetSurroundings::of(source, &lines);
     let mut reader = Reader { source, types, structures, surroundings, found };
     for line in lines {
         reader.line(line);
@@ -68,7 +68,7 @@ struct Reader<'p> {
     types: BTreeMap<String, Vec<String>>,
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
-    surroundings: Surroundings,
+    surroundings: SetSurroundings,
     found: Gathered,
 }
 

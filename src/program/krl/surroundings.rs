@@ -39,12 +39,12 @@ impl<T: Clone + PartialEq> Settings<T> {
 
 /// Base (m, rad) and payload (kg) of all targets of a file, with the byte where each is set.
 #[derive(Debug, Default)]
-pub(super) struct Surroundings {
+pub(super) struct SetSurroundings {
     base: Option<(usize, Pose)>,
     load: Option<(usize, f64)>,
 }
 
-impl Surroundings {
+impl SetSurroundings {
     /// Of the lines of a file.
     pub fn of(source: ProgramText, lines: &[&[Token]]) -> Self {
         let (mut base, mut load) = (Settings::new(), Settings::new());

@@ -5,16 +5,18 @@
 //! named target stay: the controller adds the offset to the corrected target, so that the robot goes to the shifted point with the
 //! correction of the unshifted one; a warning names the line.
 
+mod arguments;
 mod list;
 mod listed;
 mod surroundings;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
+use arguments::{arguments, depths};
 use list::{List, Want};
 pub(super) use listed::listed;
 use std::collections::BTreeMap;
-use surroundings::Surroundings;
+use surroundings::DeclaredSurroundings;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -72,7 +74,7 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
             }
         }
     }
-    let surroundings = Surroundings::of(source, &statements);
+    let surroundings = DeclaredSurroundings::of(source, &statements);
     let mut reader = Reader { source, types, surroundings, found };
     for statement in statements {
         reader.statement(statement);
@@ -156,7 +158,7 @@ struct Reader<'p> {
     source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
-    surroundings: Surroundings,
+    surroundings: DeclaredSurroundings,
     found: Gathered,
 }
 
@@ -371,34 +373,4 @@ impl Reader<'_> {
             self.found.warn(function.span.start, format!("left as it is: {name} computes the target"));
         }
     }
-}
-
-/// Tokens with the depth of brackets at each: the brackets themselves are outside.
-fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
-    let mut depth = 0;
-    tokens.iter().map(move |token| match token.sort {
-        TokenKind::Sign(b'[' | b'(' | b'{') => {
-            depth += 1;
-            (token, depth - 1)
-        }
-        TokenKind::Sign(b']' | b')' | b'}') => {
-            depth -= 1;
-            (token, depth)
-        }
-        _ => (token, depth),
-    })
-}
-
-/// Between the commas outside of brackets.
-fn arguments(tokens: &[Token]) -> Vec<&[Token]> {
-    let commas: Vec<usize> =
-        depths(tokens).enumerate().filter(|(_, (token, depth))| *depth == 0 && token.is(b',')).map(|(k, _)| k).collect();
-    let mut start = 0;
-    let mut out = Vec::with_capacity(commas.len() + 1);
-    for comma in commas {
-        out.push(&tokens[start..comma]);
-        start = comma + 1;
-    }
-    out.push(&tokens[start..]);
-    out
 }

@@ -38,7 +38,7 @@ struct MotionUse {
 
 /// What a program declares and names of them.
 #[derive(Debug, Default)]
-pub(super) struct Surroundings {
+pub(super) struct DeclaredSurroundings {
     /// Work objects in the robot's base; none where the declaration does not say, or the program sets it.
     objects: BTreeMap<String, Option<Pose>>,
     /// Masses of tools and loads, kg; none likewise.
@@ -50,7 +50,7 @@ pub(super) struct Surroundings {
     gripped: bool,
 }
 
-impl Surroundings {
+impl DeclaredSurroundings {
     /// What the statements declare.
     pub fn of(source: ProgramText, statements: &[&[Token]]) -> Self {
         let mut out = Self::default();

@@ -8,8 +8,11 @@ const REST: &str = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
 const TOOLS: &str = "PERS tooldata gun:=[TRUE,[[0,0,200],[1,0,0,0]],[12.5,[0,0,100],[1,0,0,0],0,0,0]];\nPERS tooldata bare:=[TRUE,[[0,0,0],[1,0,0,0]],[-1,[0,0,0],[1,0,0,0],0,0,0]];\nPERS loaddata part:=[30,[0,0,50],[1,0,0,0],0,0,0];\n";
 const OBJECT: &str = "PERS wobjdata bench:=[FALSE,TRUE,\"\",[[100,200,300],[0.70710678,0,0,0.70710678]],[[10,0,0],[1,0,0,0]]];\n";
 
-/// Frame and payload of every target; lines that name a frame which is not applied.
-fn read(language: Language, text: &str) -> (Vec<(Option<Pose>, Option<f64>)>, Vec<String>) {
+/// Frame and payload of a target.
+type Surroundings = (Option<Pose>, Option<f64>);
+
+/// Those of every target; lines that name a frame which is not applied.
+fn read(language: Language, text: &str) -> (Vec<Surroundings>, Vec<String>) {
     let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
     let literals = program.literals().iter().map(|literal| (literal.frame, literal.payload)).collect();
     (literals, program.frames().iter().map(|note| format!("{}: {}", note.line, note.message)).collect())
