@@ -5,6 +5,9 @@ use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 
+/// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
+const NEARLY_ZERO: f64 = 0.2;
+
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
     pub problem: &'a TorqueProblem<'a>,
@@ -43,9 +46,10 @@ impl<'a> CauseChoice<'a> {
 
     /// Whether a coefficient has a sign that its cause cannot have.
     pub fn is_impossible(&self, number: usize, solution: &[(usize, f64)]) -> bool {
-        let first = self.problem.all.of(number).start;
-        let value = solution.iter().find(|(column, _)| *column == first).map_or(0.0, |(_, value)| *value);
-        self.form(number).cause.is_positive() && value <= 0.0
+        let own = self.problem.all.of(number);
+        let values = || solution.iter().filter(|(column, _)| own.contains(column)).map(|(_, value)| *value);
+        let largest = values().map(f64::abs).fold(0.0, f64::max);
+        self.form(number).cause.is_positive() && values().any(|value| value <= -NEARLY_ZERO * largest)
     }
 
     /// Criterion of a set: whitened squared residual, tolerances stretched, and penalties.

@@ -42,7 +42,10 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
     let mut found = findings(&choice, set, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
-    found.extend(nameless(&choice, &solved.judged.withdrawn, &last));
+    let named = |place: Place| found.iter().any(|known| known.effect == UNKNOWN && known.place == place);
+    let nameless: Vec<TorqueFinding> =
+        nameless(&choice, &solved.judged.withdrawn, &last).into_iter().filter(|one| !named(one.place)).collect();
+    found.extend(nameless);
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);

@@ -92,9 +92,9 @@ impl<'a> SweptColumns<'a> {
         self.gain_of(form, &self.right)
     }
 
-    /// Whether the first coefficient of a form would be positive.
+    /// Whether each coefficient of a form would be positive alone.
     pub fn rises(&self, form: usize) -> bool {
-        self.right[self.all.of(form).start] > 0.0
+        self.all.of(form).all(|column| self.right[column] > 0.0)
     }
 
     /// The same with other inner products of its columns with a residual.

@@ -8,18 +8,18 @@ use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
 /// All its numbers in proportion.
-pub(super) struct WrongLinkMass;
+pub(super) struct HeavierLink;
 
 const WIDTH: usize = 1;
 
-impl TorqueCause for WrongLinkMass {
+impl TorqueCause for HeavierLink {
     fn name(&self) -> &'static str {
         "link_mass"
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&WrongLinkMass, link, WIDTH) };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&HeavierLink, link, WIDTH) };
         (0..links).map(form).collect()
     }
 

@@ -54,7 +54,7 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &spikes::Spikes,
     &wrist_coupling::WristCoupling,
     &payload::Payload,
-    &link_mass::WrongLinkMass,
+    &link_mass::HeavierLink,
     &link_com::WrongLinkCentre,
     &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
@@ -100,7 +100,7 @@ pub(super) trait TorqueCause: Sync {
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         false
     }
-    /// Whether its one coefficient can only be positive: a friction that falls with speed, a rotor.
+    /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
     fn is_positive(&self) -> bool {
         false
     }

@@ -48,6 +48,10 @@ impl TorqueCause for WristCoupling {
         vec![form.joint(), form.with[0]]
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[1] == 1 && USUAL.contains(&form.shape[0])
     }
