@@ -12,14 +12,14 @@ pub enum Diagnosed {
     /// By `diagnose`.
     Positions(Box<DiagnosisSummary>),
     /// By `diagnose_torques`.
-    Torques(TorqueSummary),
+    Torques(Box<TorqueSummary>),
 }
 
 impl Diagnosed {
     /// What the stage of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         if stage.uses == DiagnoseTorques::NAME {
-            return TorqueSummary::read(stage, store).map(Self::Torques);
+            return TorqueSummary::read(stage, store).map(|told| Self::Torques(Box::new(told)));
         }
         DiagnosisSummary::read(run, stage, store).map(|told| Self::Positions(Box::new(told)))
     }

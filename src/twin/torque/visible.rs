@@ -180,7 +180,7 @@ fn per_joint(joint: usize) -> Vec<Law> {
         Law::Offset { joint, size: 1.0 },
         Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
         Law::Spring { joint, size: 1.0, zero: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: 1.5707963 },
+        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2 },
     ]
 }
 
