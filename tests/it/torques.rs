@@ -48,13 +48,14 @@ struct Marks {
 }
 
 fn mark(want: &Value, told: &Value) -> Marks {
-    let mut found: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
-    let all = found.clone();
+    let all: Vec<Named> = told["findings"].as_array().expect("findings").iter().map(named).collect();
+    let mut found = all.clone();
     let mut marks = Marks { missed: Vec::new(), misplaced: 0, beside: Vec::new(), wanted: 0 };
     for entry in want["effects"].as_array().expect("effects") {
         let pair = |pair: &Value| (pair[0].as_str().expect("a name").to_string(), pair[1].as_str().expect("a place").to_string());
         let accepted: Vec<Named> = entry["accept"].as_array().expect("names").iter().map(pair).collect();
-        let hit = found.iter().any(|one| accepted.contains(one));
+        // One name may stand for two effects that the data cannot tell.
+        let hit = all.iter().any(|one| accepted.contains(one));
         found.retain(|one| !accepted.contains(one));
         if entry["optional"].as_bool() == Some(true) {
             continue;

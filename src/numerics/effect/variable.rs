@@ -1,6 +1,6 @@
 //! What a row of a recording offers that an error may depend on.
 
-use super::{ArmState, figure};
+use super::ArmState;
 use crate::robot::{Memory, RobotModel};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -189,7 +189,7 @@ impl fmt::Display for Variable {
             Self::Range => f.write_str("range"),
             Self::Slip { joint, .. } => write!(f, "travel of joint {} since it reversed", joint + 1),
             Self::Stretch { joint, limit } => {
-                write!(f, "travel of joint {} that sticks up to {} deg", joint + 1, degrees(*limit))
+                write!(f, "travel of joint {} that sticks up to {:.1} deg", joint + 1, limit.to_degrees())
             }
             Self::Recent { joint, time } => write!(f, "travel of joint {} in the last {time:.0} s", joint + 1),
             Self::Position { along } => write!(f, "position of the tool along {}", arrow(along)),
@@ -198,10 +198,6 @@ impl fmt::Display for Variable {
             Self::Lagging { .. } => f.write_str("lagging temperature"),
         }
     }
-}
-
-fn degrees(limit: f64) -> String {
-    figure(limit.to_degrees(), 1)
 }
 
 fn arrow([x, y, z]: &[f64; 3]) -> String {

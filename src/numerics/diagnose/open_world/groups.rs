@@ -1,6 +1,7 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
+use crate::diagnose::round::{GEOMETRY, SLOW};
 use crate::effect::{Axes, Basis, Hypothesis, JointTable, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -92,8 +93,10 @@ impl FreeGroup {
     /// Prior variances of the block's columns, of unit mean square at the tool; a list a length.
     pub fn variances(&self, block: &ProjectedColumns) -> Vec<Vec<f64>> {
         let functions = self.law.count();
+        let slow = if self.is_gear() { SLOW } else { 0 };
+        let held = |k: usize| if k < slow { GEOMETRY * GEOMETRY } else { 1.0 };
         let one = |spectrum: Vec<f64>| {
-            let all: Vec<f64> = (0..block.square.len()).map(|k| spectrum[k % functions]).collect();
+            let all: Vec<f64> = (0..block.square.len()).map(|k| held(k % functions) * spectrum[k % functions]).collect();
             let size: f64 = all.iter().zip(&block.square).map(|(variance, square)| variance * square).sum();
             all.into_iter().map(|variance| variance / size.max(f64::MIN_POSITIVE)).collect()
         };
