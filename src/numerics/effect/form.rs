@@ -2,9 +2,7 @@
 //!
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
-use super::{
-    ArmState, Basis, Cause, DeclaredForm, Deflection, Effect, JointTable, ParameterSpec, Place, Survey, Term, Variable, cause,
-};
+use super::{ArmState, Cause, DeclaredForm, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -127,12 +125,6 @@ impl Form {
     /// Whether it is of a cause.
     pub fn is(&self, cause: &dyn Cause) -> bool {
         self.cause().name() == cause.name()
-    }
-
-    /// Whether it is a smooth function whose coefficients have a prior of their own: a law without a name, or a joint's curve as a free form.
-    pub fn is_free(&self) -> bool {
-        let smooth = || self.term().is_some_and(|term| matches!(term.basis(), Basis::Cosines { .. }));
-        self.cause().is_nameless() || (self.is(&JointTable) && smooth())
     }
 
     /// Whether it belongs to one measurement and not to the arm: it says nothing of another recording, and a command need not

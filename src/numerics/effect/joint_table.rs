@@ -83,7 +83,7 @@ impl Cause for JointTable {
 
 /// The strongest orders per joint turn of a table, in words.
 pub(super) fn strongest_orders(table: &Term, numbers: &[&ParameterEstimate]) -> String {
-    let (Basis::Fading { low, high, .. } | Basis::Cosines { low, high, .. }) = table.basis() else { return String::new() };
+    let Basis::Fading { low, high, .. } = table.basis() else { return String::new() };
     let mut waves: Vec<(f64, f64)> = (1..).zip(numbers).map(|(k, n)| (f64::from(k), n.value.abs())).collect();
     waves.sort_by(|a, b| b.1.total_cmp(&a.1));
     // A cosine of k half periods over the range makes k pi / range periods a turn.

@@ -3,7 +3,7 @@
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
 use crate::estimate::{ErrorScale, FoldKind, Session, autocorrelation_time, dealt, gather};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Parts of the rows that were fitted, the same for every model that is compared.
 pub(crate) const FOLDS: usize = 5;
@@ -22,21 +22,6 @@ pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> 
     let random = FoldKind::Random(fitter.question.seed);
     let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
     dealt(kind, &now.session(fitter), FOLDS)
-}
-
-/// Share of the rows in the first and in the last stretch of a recording, which a law over time has to predict from the rest.
-const END: usize = 6;
-
-/// Squared errors (m2 or rad2) of the first and of the last stretch of the recording under fits to the rest; none where rows are too few.
-pub(crate) fn errors_at_ends(now: &FitState, fitter: &Fitter) -> Option<f64> {
-    let session = now.session(fitter);
-    let mut rows: Vec<usize> = session.rows.to_vec();
-    rows.sort_by(|a, b| session.data.time(*a).total_cmp(&session.data.time(*b)));
-    let long = rows.len() / END;
-    let ends = [&rows[..long], &rows[rows.len() - long..]];
-    let folds: Vec<Vec<usize>> = ends.map(|end| end.iter().copied().collect::<BTreeSet<usize>>().into_iter().collect()).to_vec();
-    let errors = session.without_each(&folds, fitter.scale);
-    (long > 0).then(|| errors.iter().flatten().map(|error| error * error).sum())
 }
 
 /// A model that is worse by this share, and by so many standard errors, is worse.

@@ -10,7 +10,7 @@ mod withdraw;
 pub(crate) use alternatives::Alternatives;
 pub(crate) use comparison::ModelComparison;
 pub(crate) use exchange::RIVALS;
-pub(crate) use fold_errors::{FOLDS, FoldErrors, FoldGain, errors_at_ends};
+pub(crate) use fold_errors::{FOLDS, FoldErrors, FoldGain};
 
 use super::round::FitState;
 

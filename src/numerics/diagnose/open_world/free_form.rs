@@ -30,8 +30,6 @@ pub(super) struct FreeForm {
     pub place: Place,
     /// ln of its evidence over that of the state that it is beside; the choice among groups is in it.
     pub log: f64,
-    /// The same of what is in no list, whatever the joints' own curves say.
-    pub open: f64,
     pub terms: Vec<FreeTerm>,
     /// By how much the squared residual, over the noise, falls with it.
     pub gain: f64,
@@ -41,8 +39,6 @@ pub(super) struct FreeForm {
 pub(super) struct PlaceGroups {
     pub place: Place,
     groups: Vec<FreeGroup>,
-    /// Which of them the list has.
-    laws: Vec<bool>,
     blocks: Vec<ProjectedColumns>,
     variances: Vec<Vec<Vec<f64>>>,
     /// GroupProducts of the columns of the model's causes with those of each.
@@ -63,20 +59,17 @@ impl PlaceGroups {
     pub fn of(place: Place, around: &AroundGroups) -> Self {
         let mut columns = GroupColumns::new(around.frame);
         let all = columns.of(place, around.survey);
-        let (groups, laws, blocks, variances, known) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut out = Self { place, groups, laws, blocks, variances, known };
+        let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
         out.take(all, &mut columns, around);
         out
     }
 
     fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups) {
         for group in groups {
-            let is_law = group.is_listed(around.without);
-            if is_law && !group.is_gear() {
+            if group.is_listed(around.without) {
                 continue;
             }
             let Some(block) = columns.block(&group) else { continue };
-            self.laws.push(is_law);
             self.known.push(product(view(around.causes), view(&block.columns)));
             self.variances.push(group.variances(&block));
             self.groups.push(group);
@@ -132,7 +125,6 @@ impl PlaceGroups {
 
     fn swap(&mut self, g: usize, other: usize) {
         self.groups.swap(g, other);
-        self.laws.swap(g, other);
         self.blocks.swap(g, other);
         self.variances.swap(g, other);
         self.known.swap(g, other);
@@ -140,7 +132,6 @@ impl PlaceGroups {
 
     fn truncate(&mut self, count: usize) {
         self.groups.truncate(count);
-        self.laws.truncate(count);
         self.blocks.truncate(count);
         self.variances.truncate(count);
         self.known.truncate(count);
@@ -152,25 +143,21 @@ impl PlaceGroups {
         choices.max(1.0).ln() + (self.groups[g].of as f64).ln()
     }
 
-    /// ln of the evidence of all groups as alternatives, each with its price, and of those that no list has; none whose amplitude no arm
-    /// can have.
-    fn alternatives(&self, scan: &[(GroupEvidence, usize)]) -> [f64; 2] {
-        let sound = |g: &usize| !scan[*g].0.is_off_the_grid();
-        let paid = |g: usize| scan[g].0.log - self.price(g);
-        let all = (0..scan.len()).filter(sound).map(paid).collect::<Vec<_>>();
-        let open = (0..scan.len()).filter(sound).filter(|g| !self.laws[*g]).map(paid).collect::<Vec<_>>();
-        [log_sum(&all), log_sum(&open)]
+    /// ln of the evidence of all groups as alternatives, each with its price; none whose amplitude no arm can have.
+    fn alternatives(&self, scan: &[(GroupEvidence, usize)]) -> f64 {
+        let sound = scan.iter().enumerate().filter(|(_, (found, _))| !found.is_off_the_grid());
+        log_sum(&sound.map(|(g, (found, _))| found.log - self.price(g)).collect::<Vec<_>>())
     }
 
     /// The same beside a state.
-    pub fn first(&self, state: &KnownCauses) -> [f64; 2] {
+    pub fn first(&self, state: &KnownCauses) -> f64 {
         self.alternatives(&self.scan(state))
     }
 
     /// The free form beside a state.
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
         let (mut now, mut terms) = (state.clone(), Vec::new());
-        let (mut log, mut open) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        let mut log = f64::NEG_INFINITY;
         let mut columns = GroupColumns::new(around.frame);
         for step in 0..GROUPS {
             let scan = self.scan(&now);
@@ -178,7 +165,7 @@ impl PlaceGroups {
             let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
             let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
             if step == 0 {
-                [log, open] = self.alternatives(&scan);
+                log = self.alternatives(&scan);
                 if paid(best) < 0.0 {
                     break;
                 }
@@ -186,7 +173,6 @@ impl PlaceGroups {
                 break;
             } else {
                 log += paid(best);
-                open += paid(best);
             }
             self.refine(best, scan[best].0.log, &now, &mut columns, around);
             let (found, length) = self.closest(best, &now);
@@ -200,7 +186,7 @@ impl PlaceGroups {
                 self.take(products, &mut columns, around);
             }
         }
-        FreeForm { place: self.place, log, open, terms, gain: now.gain() - state.gain() }
+        FreeForm { place: self.place, log, terms, gain: now.gain() - state.gain() }
     }
 }
 

@@ -1,8 +1,7 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use crate::diagnose::round::{GEOMETRY, SLOW};
-use crate::effect::{Axes, Basis, Hypothesis, JointTable, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
@@ -58,18 +57,9 @@ impl FreeGroup {
         self.motion.place()
     }
 
-    /// As what may join the model: a law without a name, or the curve of a joint, where the list has that.
-    pub fn hypothesis(&self, without: &[String]) -> Hypothesis {
-        if self.is_gear() && self.is_listed(without) {
-            return Hypothesis::new(Term::new(&JointTable, self.motion, self.law), 1);
-        }
+    /// As what may join the model: a law without a name.
+    pub fn hypothesis(&self) -> Hypothesis {
         Hypothesis::new(Term::new(&Unknown, self.motion, self.law), 1)
-    }
-
-    /// Whether it is the turn of a joint over its own angle as finely as gears make it.
-    pub fn is_gear(&self) -> bool {
-        let fine = self.law.times.is_none() && self.law.first.basis.count() >= FINEST;
-        matches!((self.motion, self.law.first.of), (Motion::Joint { joint }, Variable::Angle { joint: own }) if fine && own == joint)
     }
 
     /// Whether it is a law of the list, some names left out: no free form then.
@@ -93,10 +83,8 @@ impl FreeGroup {
     /// Prior variances of the block's columns, of unit mean square at the tool; a list a length.
     pub fn variances(&self, block: &ProjectedColumns) -> Vec<Vec<f64>> {
         let functions = self.law.count();
-        let slow = if self.is_gear() { SLOW } else { 0 };
-        let held = |k: usize| if k < slow { GEOMETRY * GEOMETRY } else { 1.0 };
         let one = |spectrum: Vec<f64>| {
-            let all: Vec<f64> = (0..block.square.len()).map(|k| held(k % functions) * spectrum[k % functions]).collect();
+            let all: Vec<f64> = (0..block.square.len()).map(|k| spectrum[k % functions]).collect();
             let size: f64 = all.iter().zip(&block.square).map(|(variance, square)| variance * square).sum();
             all.into_iter().map(|variance| variance / size.max(f64::MIN_POSITIVE)).collect()
         };
@@ -232,8 +220,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         let Some(first) = self.basis(of, EACH) else { return Vec::new() };
         let all = motions(group.place(), survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
-        let product = |(other, count): (Variable, usize)| {
-            let second = self.basis(other, EACH).filter(|_| other != of && count < FINEST)?;
+        let product = |(other, _): (Variable, usize)| {
+            let second = self.basis(other, EACH).filter(|_| other != of)?;
             Some(FreeGroup { law: Law::new(of, first).times(other, second), ..*group })
         };
         others.filter_map(product).collect()
@@ -302,8 +290,8 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
         Place::Joint(joint) => {
             let own: Vec<_> =
                 angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain(moved(joint)).chain(space()).collect();
-            let finest = (Variable::Angle { joint }, FINEST);
-            let mut out = vec![(Motion::Joint { joint }, own.iter().copied().chain([finest]).collect::<Vec<_>>())];
+            let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { FINEST } else { *count }));
+            let mut out = vec![(Motion::Joint { joint }, finest.collect())];
             if survey.robot.is_revolute(joint) {
                 out.push((Motion::Axis { joint, about: None, turning: false }, own.clone()));
                 out.push((Motion::Slide { joint, along: true }, own.clone()));
@@ -343,7 +331,6 @@ fn name_of(group: &FreeGroup) -> Option<&'static str> {
     let first = group.law.first;
     match (group.motion, first.of, group.law.times) {
         (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some("backlash"),
-        _ if group.is_gear() => Some(JointTable::NAME),
         (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some("zero_shift"),
         (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some("base_shift"),
         (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some("tool_shift"),
@@ -358,20 +345,6 @@ fn name_of(group: &FreeGroup) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::Effect;
-
-    fn turn(count: usize) -> FreeGroup {
-        let law = Law::new(Variable::Angle { joint: 2 }, Basis::Cosines { low: -1.0, high: 1.0, count });
-        FreeGroup { motion: Motion::Joint { joint: 2 }, law, of: 1 }
-    }
-
-    #[test]
-    fn a_joint_over_its_own_angle_is_the_curve_of_the_list_unless_that_is_left_out() {
-        let name = |group: FreeGroup, without: &[String]| group.hypothesis(without).form.name();
-        assert_eq!(name(turn(FINEST), &[]), JointTable::NAME);
-        assert_eq!(name(turn(FINEST), &[JointTable::NAME.into()]), Unknown::NAME);
-        assert_eq!(name(turn(FINE), &[]), Unknown::NAME);
-    }
 
     #[test]
     fn directions_near_one_are_off_it_by_the_angle_that_was_asked() {

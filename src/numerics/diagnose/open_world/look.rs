@@ -9,7 +9,7 @@ use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
 use crate::diagnose::words::{FindingGroups, FindingKey, groups};
-use crate::effect::{Effect, GearCyclic, JointTable, Place, Survey};
+use crate::effect::{Effect, Place, Survey};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -155,7 +155,6 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| NamedFinding {
             key: *key,
             members: members.clone(),
-            is_of_gears: members.iter().all(|i| causes[*i].form.is(&GearCyclic) || causes[*i].form.is(&JointTable)),
             own: members.iter().flat_map(|i| own(*i, members.len())).collect(),
         };
         let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();

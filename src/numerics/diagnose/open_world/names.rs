@@ -51,7 +51,7 @@ pub(super) struct ContestedName {
 
 /// What the free forms of all places say beside a state.
 pub(super) struct SurveyedPlaces {
-    /// ln of the evidence of each place's, of what no list has.
+    /// ln of the evidence of each place's.
     pub logs: Vec<(Place, f64)>,
     /// The best ones with their terms, best first.
     pub best: Vec<FreeForm>,
@@ -60,7 +60,7 @@ pub(super) struct SurveyedPlaces {
 /// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
 pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &AroundGroups) -> Vec<SurveyedPlaces> {
     let all = places(around.survey);
-    let firsts: Vec<Vec<[f64; 2]>> = all
+    let firsts: Vec<Vec<f64>> = all
         .par_iter()
         .map(|place| {
             let groups = PlaceGroups::of(*place, around);
@@ -70,8 +70,8 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
     let mut wanted: Vec<(usize, usize)> = Vec::new();
     for (s, (_, own)) in states.iter().enumerate() {
         let mut order: Vec<usize> = (0..all.len()).collect();
-        order.sort_by(|a, b| firsts[*b][s][0].total_cmp(&firsts[*a][s][0]));
-        let mut chosen: Vec<usize> = order.into_iter().take(CLOSER).filter(|p| firsts[*p][s][0] > 0.0).collect();
+        order.sort_by(|a, b| firsts[*b][s].total_cmp(&firsts[*a][s]));
+        let mut chosen: Vec<usize> = order.into_iter().take(CLOSER).filter(|p| firsts[*p][s] > 0.0).collect();
         chosen.extend((0..all.len()).filter(|p| Some(all[*p]) == *own && !chosen.contains(p)).collect::<Vec<_>>());
         wanted.extend(chosen.into_iter().map(|p| (p, s)));
     }
@@ -88,7 +88,7 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
         .map(|s| {
             let mut own: Vec<FreeForm> = forms.iter().filter(|(of, _)| *of == s).map(|(_, form)| form.clone()).collect();
             own.sort_by(|a, b| b.log.total_cmp(&a.log));
-            let log = |p: usize| own.iter().find(|form| form.place == all[p]).map_or(firsts[p][s][1], |form| form.open);
+            let log = |p: usize| own.iter().find(|form| form.place == all[p]).map_or(firsts[p][s], |form| form.log);
             let logs = (0..all.len()).map(|p| (all[p], log(p))).collect();
             SurveyedPlaces { logs, best: own }
         })
@@ -99,8 +99,6 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
 pub(super) struct NamedFinding {
     pub key: FindingKey,
     pub members: Vec<usize>,
-    /// Whether it is the error of a joint over its own angle.
-    pub is_of_gears: bool,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
     pub own: Vec<(usize, f64)>,
 }
@@ -137,19 +135,19 @@ impl NameCase<'_, '_, '_, '_> {
         let mine = listed + own.log - price(&named.members);
         let best_beside = beside.best.first();
         let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);
-        let refined = beside.best.iter().find(|form| form.place == place && more(form) < FINER && form.open > 0.0);
+        let refined = beside.best.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
         let mut names: Vec<(Place, f64)> = Vec::new();
         if is_named {
             names.push((place, mine));
-            names.extend(refined.map(|form| (place, mine + form.open + 0.5f64.ln())));
+            names.extend(refined.map(|form| (place, mine + form.log + 0.5f64.ln())));
         }
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
         let mut free: Vec<(Place, f64)> = instead.logs.iter().map(|(place, log)| (*place, open + log)).collect();
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
-        } else if let Some(form) = best_beside.filter(|form| form.open > 0.0 && more(form) >= FINER) {
-            free.push((place, open + mine + form.open));
+        } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= FINER) {
+            free.push((place, open + mine + form.log));
         }
         let logs = |of: &[(Place, f64)]| log_sum(&of.iter().map(|(_, log)| *log).collect::<Vec<_>>());
         let here =
@@ -163,10 +161,7 @@ impl NameCase<'_, '_, '_, '_> {
         };
         let alternative = instead.best.first().filter(|form| !form.terms.is_empty());
         let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
-        // The same curve under a better prior keeps its name.
-        let same = |form: &FreeForm| form.place == place && named.is_of_gears && form.terms[0].group.is_gear();
-        let may = |form: &&FreeForm| is_named && (odds.none > 0.5 || same(form));
-        let instead = alternative.filter(may).filter(|form| form.log > with_more + CLEARLY).cloned();
+        let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
@@ -250,7 +245,7 @@ struct Own {
 /// Roots of the prior variances of a cause's coefficients as they are in the model: of a free form its own, of a law those of its size.
 pub(super) fn fitted_variances(state: &FitState, cause: usize, square: &[f64]) -> Vec<f64> {
     let own = &state.causes[cause];
-    if own.form.is_free() && own.priors.len() == square.len() {
+    if own.form.cause().is_nameless() && own.priors.len() == square.len() {
         return own.priors.iter().map(|prior| prior.sigma * prior.sigma).collect();
     }
     let x = &state.model.x[state.ranges[cause].clone()];
@@ -261,7 +256,7 @@ pub(super) fn fitted_variances(state: &FitState, cause: usize, square: &[f64]) -
 
 /// Prior variances of a cause's coefficients of unit mean square at the tool: of a free form as its spectrum has them, of a law all alike.
 pub(super) fn unit_variances(cause: &EstimatedCause, square: &[f64]) -> Vec<f64> {
-    let own = cause.form.is_free() && cause.priors.len() == square.len();
+    let own = cause.form.cause().is_nameless() && cause.priors.len() == square.len();
     let shape: Vec<f64> =
         if own { cause.priors.iter().map(|prior| prior.sigma * prior.sigma).collect() } else { vec![1.0; square.len()] };
     let all: f64 = shape.iter().zip(square).map(|(variance, square)| variance * square).sum();

@@ -39,8 +39,8 @@ pub(crate) struct EstimatedCause {
 const TYPICAL: f64 = 2.0 * 1.4826;
 /// Cosines of a curve of less than two periods over its range are all but geometry, which alone carries on beyond the range: they are
 /// held down to this share.
-pub(crate) const SLOW: usize = 3;
-pub(crate) const GEOMETRY: f64 = 0.2;
+const SLOW: usize = 3;
+const GEOMETRY: f64 = 0.2;
 
 impl EstimatedCause {
     /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or

@@ -12,7 +12,7 @@ mod view;
 
 pub use base_model::BASE;
 pub(crate) use correlated_noise::correlation_left_by;
-pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, GEOMETRY, SLOW, with_causes};
+pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, with_causes};
 pub(crate) use history::{RoundHistory, RoundOutcome};
 pub(crate) use noise::REPEATS;
 pub(crate) use view::{RoundView, compliance};
