@@ -6,6 +6,7 @@ mod marks;
 mod names;
 mod pipeline;
 mod points;
+mod quantities;
 mod reading;
 mod robots;
 mod sheet;
@@ -18,6 +19,7 @@ pub use robots::{KINDS, RobotFileKind};
 use crate::error::{Error, Result, counted};
 use columns::ExaminedFile;
 use pipeline::missing;
+use quantities::examine;
 use std::path::{Path, PathBuf};
 
 /// What is there and what is wanted.
@@ -57,7 +59,7 @@ impl StarterFiles {
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
-    let tables = request.data.iter().map(|path| ExaminedFile::read(path, places)).collect::<Result<Vec<_>>>()?;
+    let tables = request.data.iter().map(|path| examine(path, places)).collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
     if request.data.len() > 2 && !found.iter().all(together::is_whole) {
         let message = format!(

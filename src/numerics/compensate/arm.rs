@@ -7,6 +7,7 @@ use crate::estimate::network::Correction;
 use crate::robot::{Measurements, Memories};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Under which conditions a command will be carried out.
@@ -82,6 +83,15 @@ impl IdentifiedArm {
             let k = range.find(|k| x[*k] != 0.0)?;
             Some(format!("{} at {}", effect.name(), specs[k].place))
         })
+    }
+
+    /// Effects and places that depend on moves before the target, which no target states: they are taken as those of an arm that rested.
+    pub(super) fn by_earlier_moves(&self) -> Vec<String> {
+        let (specs, x) = (self.model.stack.specs(), &self.model.x);
+        let follows = |form: &Form| form.variables().into_iter().any(Variable::follows_earlier_moves);
+        let effects = self.model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(follows));
+        let moved = effects.filter_map(|(effect, mut range)| range.find(|k| x[*k] != 0.0).map(|k| (effect.name(), k)));
+        moved.map(|(name, k)| format!("{name} at {}", specs[k].place)).collect::<BTreeSet<String>>().into_iter().collect()
     }
 
     /// The base in the tracker's frame.

@@ -80,6 +80,8 @@ pub struct Corrector<'a> {
     manner: CorrectionOptions,
     /// What of the model depends on motor currents.
     by_current: Option<String>,
+    /// What of it depends on moves before a target.
+    by_earlier_moves: Vec<String>,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
@@ -165,8 +167,9 @@ impl<'a> Corrector<'a> {
         manner: CorrectionOptions,
     ) -> Self {
         let (joints, by_current) = (arm.model().robot.joints(), arm.by_current());
+        let by_earlier_moves = arm.by_earlier_moves();
         let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
-        Self { arm, coverage, uncertainty, manner, by_current, last: None, direction, tally }
+        Self { arm, coverage, uncertainty, manner, by_current, by_earlier_moves, last: None, direction, tally }
     }
 
     /// Whether targets get an uncertainty.
@@ -269,6 +272,8 @@ impl<'a> Corrector<'a> {
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             remarks.extend(certainty.iter().flat_map(Remark::of_certainty));
+            let earlier = Some(&self.by_earlier_moves).filter(|findings| !findings.is_empty());
+            remarks.extend(earlier.cloned().map(Remark::EarlierMoves));
             let share = reach.share();
             if share < 1.0 {
                 remarks.push(Remark::Faded(share));

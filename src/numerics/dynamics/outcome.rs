@@ -122,8 +122,10 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
     let falls = format!("mean NRMSE of judged rows {:.3} before, {:.3} after", nrmse[0], nrmse[1]);
     match verdict {
         VerdictKind::NothingMissing => format!("the rigid arm explains the torques down to their noise ({falls})"),
-        VerdictKind::Explained => format!("{} bring the torques down to their noise ({falls})", counted(found.len(), "finding")),
-        _ => format!("{} leave up to {over:.1} times the noise ({falls})", counted(found.len(), "finding")),
+        VerdictKind::Explained => {
+            format!("with {} the torques are explained down to their noise ({falls})", counted(found.len(), "finding"))
+        }
+        _ => format!("with {} up to {over:.1} times the noise is left ({falls})", counted(found.len(), "finding")),
     }
 }
 

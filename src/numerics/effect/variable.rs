@@ -160,6 +160,11 @@ impl Variable {
         matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })
     }
 
+    /// Whether it follows from moves that no target states: from where the arm comes, or how fast it has moved.
+    pub fn follows_earlier_moves(self) -> bool {
+        matches!(self, Self::Move { .. } | Self::LastMove | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. })
+    }
+
     /// Whether it follows from the way to the row, which nobody knows for the first one.
     pub fn follows_the_way(self) -> bool {
         let last = matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove);

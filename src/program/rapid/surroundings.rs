@@ -167,6 +167,7 @@ impl DeclaredSurroundings {
     pub fn settle(self, found: &mut Gathered) {
         let mut told = BTreeSet::new();
         let mut notes: Vec<(bool, usize, String)> = Vec::new();
+        let mut of_the_file: Option<String> = None;
         for (k, literal) in found.literals.iter_mut().enumerate() {
             let name = self.names.iter().find(|(literals, _)| literals.contains(&k)).map(|(_, name)| name.clone());
             let target = name.map_or(UsedTarget::Literal(k), UsedTarget::Named);
@@ -192,6 +193,14 @@ impl DeclaredSurroundings {
                 if tools.len() > 1 {
                     let tools = tools.iter().map(|tool| format!("`{tool}`")).collect::<Vec<_>>().join(", ");
                     notes.push((true, at, format!("is reached with the tools {tools}, of which the robot file has one")));
+                } else if let Some(tool) = tools.first() {
+                    if let Some(first) = of_the_file.as_ref().filter(|first| *first != tool) {
+                        let why = format!(
+                            "is reached with the tool `{tool}`, another target with `{first}`, of which the robot file has one"
+                        );
+                        notes.push((true, at, why));
+                    }
+                    of_the_file.get_or_insert_with(|| (*tool).to_string());
                 }
             }
             let load = |used: &MotionUse| used.load.clone().or_else(|| used.tool.clone());

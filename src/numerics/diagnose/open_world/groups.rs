@@ -221,7 +221,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         let all = motions(group.place(), survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
         let product = |(other, _): (Variable, usize)| {
-            let second = self.basis(other, EACH).filter(|_| other != of)?;
+            // What has a number of its own to be found is no second factor.
+            let second = self.basis(other, EACH).filter(|_| other != of && alike(other) == 1)?;
             Some(FreeGroup { law: Law::new(of, first).times(other, second), ..*group })
         };
         others.filter_map(product).collect()

@@ -22,10 +22,6 @@ impl TorqueCause for GravityDirection {
         4.0
     }
 
-    fn acts_on(&self, _form: &TorqueForm, joints: usize) -> Vec<usize> {
-        (0..joints).collect()
-    }
-
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         true
     }

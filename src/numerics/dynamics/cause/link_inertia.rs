@@ -1,11 +1,10 @@
 //! A link whose inertia is not the declared one.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
-use crate::effect::Place;
 
 /// Six numbers about the joint's point.
 pub(super) struct WrongLinkInertia;
@@ -18,25 +17,15 @@ impl TorqueCause for WrongLinkInertia {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        let links = if scene.declared.is_some() { scene.joints() } else { 0 };
-        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&WrongLinkInertia, link, WIDTH) };
-        (0..links).map(form).collect()
+        at_each_link(&WrongLinkInertia, scene, WIDTH)
     }
 
     fn price(&self, _form: &TorqueForm) -> f64 {
         8.0
     }
 
-    fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
-        (0..=form.link()).collect()
-    }
-
     fn is_inertial(&self) -> bool {
         true
-    }
-
-    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
-        out.fill(0.0);
     }
 
     fn inertial(&self, form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {

@@ -82,12 +82,18 @@ pub(super) trait TorqueCause: Sync {
     fn price(&self, _form: &TorqueForm) -> f64 {
         6.0
     }
-    /// Joints whose torque it changes.
-    fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
-        vec![form.joint()]
+    /// Joints whose torque it changes: its own, and those that carry its link or the tool and the base.
+    fn acts_on(&self, form: &TorqueForm, joints: usize) -> Vec<usize> {
+        match form.place {
+            Place::Joint(joint) => vec![joint],
+            Place::Links(link, _) => (0..=link).collect(),
+            _ => (0..joints).collect(),
+        }
     }
-    /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded.
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]);
+    /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded; zero of what is a change of masses alone.
+    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        out.fill(0.0);
+    }
     /// Link and change of its numbers per coefficient, for causes that are wrong masses: these write nothing.
     fn inertial(&self, _form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
         None
@@ -198,6 +204,13 @@ fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
 /// The forms of a cause that sits at each joint.
 fn at_each_joint(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize) -> Vec<TorqueForm> {
     (0..scene.joints()).map(|joint| TorqueForm::at_joint(cause, joint, width)).collect()
+}
+
+/// The forms of a cause that sits at each link of declared masses.
+fn at_each_link(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize) -> Vec<TorqueForm> {
+    let links = if scene.declared.is_some() { scene.joints() } else { 0 };
+    let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(cause, link, width) };
+    (0..links).map(form).collect()
 }
 
 /// The forms of a cause at each joint with each of some shape numbers.

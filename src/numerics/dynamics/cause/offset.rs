@@ -27,9 +27,7 @@ impl TorqueCause for Offset {
         true
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
-        let joint = form.joint();
-        let _ = (joint, scene);
+    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         out.fill(1.0);
     }
 

@@ -32,20 +32,12 @@ impl TorqueCause for Payload {
         4.0
     }
 
-    fn acts_on(&self, _form: &TorqueForm, joints: usize) -> Vec<usize> {
-        (0..joints).collect()
-    }
-
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         true
     }
 
     fn is_inertial(&self) -> bool {
         true
-    }
-
-    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
-        out.fill(0.0);
     }
 
     fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
