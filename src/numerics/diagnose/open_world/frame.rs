@@ -61,6 +61,11 @@ impl<'a> ProjectedRows<'a> {
         self.residual.len()
     }
 
+    /// In standard deviations of the rows.
+    pub fn residual(&self) -> &[f64] {
+        &self.residual
+    }
+
     pub fn square(&self) -> f64 {
         self.residual.iter().map(|value| value * value).sum()
     }

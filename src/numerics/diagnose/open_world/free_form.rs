@@ -3,6 +3,7 @@
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
 use super::frame::{ProjectedColumns, ProjectedRows, product, view};
 use super::groups::{FreeGroup, GroupColumns};
+use super::pairs::pairs;
 use super::state::KnownCauses;
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
@@ -56,9 +57,11 @@ pub(super) struct AroundGroups<'f, 'a> {
 }
 
 impl PlaceGroups {
-    pub fn of(place: Place, around: &AroundGroups) -> Self {
+    /// Those of a place, with the products of two variables that what the states leave points at.
+    pub fn of(place: Place, states: &[&KnownCauses], around: &AroundGroups) -> Self {
         let mut columns = GroupColumns::new(around.frame);
-        let all = columns.of(place, around.survey);
+        let mut all = columns.of(place, around.survey);
+        all.extend(pairs(place, states, around.frame, &mut columns, around.survey));
         let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
         out.take(all, &mut columns, around);
         out

@@ -2,7 +2,7 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
 /// Correlation lengths of smooth functions, shares of their variable's range.
@@ -15,6 +15,10 @@ const COARSE: usize = 8;
 const SKETCH: usize = 4;
 /// Cosines of each of two variables.
 const EACH: usize = 4;
+/// Cosines by which one of two variables is told from the other, and the share of its variance above which it is: what follows the other shows
+/// no product of both.
+const TOLD_BY: usize = 6;
+const TOLD: f64 = 0.7;
 /// Cosines have no slope at the ends of their range: it is wider than the rows' by this share at either end.
 const MARGIN: f64 = 0.1;
 /// A variable of no more values than this is a number of its own, not a range.
@@ -48,7 +52,7 @@ const SHORT: f64 = 1e-3;
 pub(super) struct FreeGroup {
     pub motion: Motion,
     pub law: Law,
-    /// How many steps it is one of; 1 for smooth functions.
+    /// How many of its kind it is one of, as steps or products; 1 for what is tried by itself.
     pub of: usize,
 }
 
@@ -136,9 +140,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     pub fn block(&mut self, group: &FreeGroup) -> Option<ProjectedColumns> {
         let mut functions: Vec<Vec<f64>> = vec![vec![1.0; self.frame.view.problem.rows.len()]];
         for factor in group.law.factors() {
-            let values = self.values(factor.of)?;
-            let mut own = vec![vec![0.0; values.len()]; factor.basis.count()];
-            values.iter().enumerate().for_each(|(row, u)| factor.basis.at(*u, &mut |k, value| own[k][row] = value));
+            let own = self.at_rows(factor.of, &factor.basis)?;
             let times = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).collect();
             functions = functions.iter().flat_map(|a| own.iter().map(move |b| times(a, b))).collect();
         }
@@ -167,6 +169,30 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             }
         }
         Some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
+    }
+
+    /// The share of a variable's variance that a smooth function of another one tells.
+    fn follows(&mut self, of: Variable, by: Variable) -> f64 {
+        let Some(told) = self.functions(by, TOLD_BY) else { return 0.0 };
+        let Some(values) = self.values(of).map(DVector::from_column_slice) else { return 0.0 };
+        let columns = told.iter().map(|column| DVector::from_column_slice(column));
+        let ones = std::iter::once(DVector::from_element(values.len(), 1.0));
+        let told = DMatrix::from_columns(&ones.chain(columns).collect::<Vec<_>>()).qr().q();
+        let centred = values.add_scalar(-values.mean());
+        told.tr_mul(&centred).norm_squared() / centred.norm_squared().max(f64::MIN_POSITIVE)
+    }
+
+    /// The first functions of a variable at every row, function by function; none of what hardly varies.
+    pub fn functions(&mut self, of: Variable, count: usize) -> Option<Vec<Vec<f64>>> {
+        let basis = self.basis(of, count)?;
+        self.at_rows(of, &basis)
+    }
+
+    fn at_rows(&mut self, of: Variable, basis: &Basis) -> Option<Vec<Vec<f64>>> {
+        let values = self.values(of)?;
+        let mut out = vec![vec![0.0; values.len()]; basis.count()];
+        values.iter().enumerate().for_each(|(row, u)| basis.at(*u, &mut |k, value| out[k][row] = value));
+        Some(out)
     }
 
     /// All groups of a place.
@@ -217,20 +243,23 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             return Vec::new();
         }
         let of = group.law.first.of;
-        let Some(first) = self.basis(of, EACH) else { return Vec::new() };
         let all = motions(group.place(), survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
-        let product = |(other, _): (Variable, usize)| {
-            // What has a number of its own to be found is no second factor.
-            let second = self.basis(other, EACH).filter(|_| other != of && alike(other) == 1)?;
-            Some(FreeGroup { law: Law::new(of, first).times(other, second), ..*group })
-        };
-        others.filter_map(product).collect()
+        // What has a number of its own to be found is no second factor.
+        let single: Vec<Variable> = others.map(|(other, _)| other).filter(|other| *other != of && alike(*other) == 1).collect();
+        single.into_iter().filter_map(|other| self.product(group.motion, [of, other], group.of)).collect()
+    }
+
+    /// The product of two variables, where the rows show one: neither follows the other.
+    pub fn product(&mut self, motion: Motion, [first, second]: [Variable; 2], of: usize) -> Option<FreeGroup> {
+        let law = Law::new(first, self.basis(first, EACH)?).times(second, self.basis(second, EACH)?);
+        let told = self.follows(first, second).max(self.follows(second, first));
+        (told <= TOLD).then_some(FreeGroup { motion, law, of })
     }
 }
 
 /// How many variables like this one are tried, one choice together.
-fn alike(of: Variable) -> usize {
+pub(super) fn alike(of: Variable) -> usize {
     match of {
         Variable::Position { .. } | Variable::Sighted { .. } => ARROWS.len(),
         Variable::Stretch { .. } => LIMITS.len(),
@@ -272,7 +301,7 @@ fn length(survey: &Survey, link: usize) -> f64 {
 }
 
 /// The motions of a place, and what each may follow with how many cosines.
-fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
+pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
     let angles = |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { FINE } else { COARSE }));
     let passing = || [(Variable::Time, FINE), (Variable::Temperature, COARSE), (Variable::Payload, COARSE)].into_iter();

@@ -13,6 +13,7 @@ mod free_form;
 mod groups;
 mod look;
 mod names;
+mod pairs;
 mod settle;
 mod state;
 mod step;

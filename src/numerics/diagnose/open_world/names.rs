@@ -63,7 +63,8 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
     let firsts: Vec<Vec<f64>> = all
         .par_iter()
         .map(|place| {
-            let groups = PlaceGroups::of(*place, around);
+            let beside: Vec<&KnownCauses> = states.iter().map(|(state, _)| state).collect();
+            let groups = PlaceGroups::of(*place, &beside, around);
             states.iter().map(|(state, _)| groups.first(state)).collect()
         })
         .collect();
@@ -80,7 +81,7 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
         .par_iter()
         .map(|p| {
             let own = wanted.iter().filter(|(other, _)| other == p);
-            own.map(|(_, s)| (*s, PlaceGroups::of(all[*p], around).greedy(&states[*s].0, around))).collect()
+            own.map(|(_, s)| (*s, PlaceGroups::of(all[*p], &[&states[*s].0], around).greedy(&states[*s].0, around))).collect()
         })
         .collect();
     let forms: Vec<(usize, FreeForm)> = forms.into_iter().flatten().collect();

@@ -62,6 +62,18 @@ impl KnownCauses {
         GroupProducts { gram, gradient }
     }
 
+    /// What the state leaves of the residual, in standard deviations of the noise times the root of `scale`.
+    pub fn leaves(&self, frame: &ProjectedRows) -> Vec<f64> {
+        let mut left = DVector::from_column_slice(frame.residual());
+        if let Some(factor) = &self.factor {
+            let mut along = self.along.clone();
+            factor.l_dirty().tr_solve_lower_triangular_mut(&mut along);
+            left.gemv(-1.0, &self.columns, &along, 1.0);
+        }
+        left *= self.scale.sqrt();
+        left.data.into()
+    }
+
     /// ln of the evidence over that of noise alone.
     pub fn log(&self) -> f64 {
         let determinant =
