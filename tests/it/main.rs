@@ -24,6 +24,7 @@ mod declared;
 mod desk;
 mod diagnose;
 mod diff;
+mod digests;
 mod disk;
 mod effects;
 mod export;
