@@ -116,6 +116,26 @@ pub(super) struct Scan {
 const EXAMPLES: usize = 1000;
 
 impl Scan {
+    fn new(label: String, slots: Vec<usize>, packed: Option<PackedRows>) -> Self {
+        Self {
+            label,
+            lines: 0,
+            read: 0,
+            last: 0,
+            tally: RefusalCounts::new(),
+            keys: Vec::new(),
+            times: Vec::new(),
+            usable: Vec::new(),
+            packed,
+            slots,
+            turns: FileOddities::default(),
+            beyond: FileOddities::default(),
+            largest: 0.0,
+            track: None,
+            measured: None,
+            ids: Vec::new(),
+        }
+    }
     pub(super) fn refused(&self) -> u64 {
         self.tally.values().map(|count| count.rows).sum()
     }
@@ -143,24 +163,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         targets: reading.binding().points.len(),
         ..PackedRows::default()
     });
-    let mut scan = Scan {
-        label,
-        lines: 0,
-        read: 0,
-        last: 0,
-        tally: RefusalCounts::new(),
-        keys: Vec::new(),
-        times: Vec::new(),
-        usable: Vec::new(),
-        packed,
-        slots,
-        turns: FileOddities::default(),
-        beyond: FileOddities::default(),
-        largest: 0.0,
-        track: None,
-        measured: None,
-        ids: Vec::new(),
-    };
+    let mut scan = Scan::new(label, slots, packed);
     let mut measured = reading.binding().measures.then(blake3::Hasher::new);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
