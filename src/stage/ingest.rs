@@ -13,6 +13,7 @@ mod clock;
 mod columns;
 mod copies;
 pub mod encoding;
+mod feather;
 mod joined;
 mod later;
 mod layout;

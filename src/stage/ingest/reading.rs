@@ -18,7 +18,7 @@ use std::path::Path;
 const STRIDE: u64 = 4096;
 
 /// Every kind of file; the first that a file is, text at last.
-const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &lines::FORMAT];
+const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &super::feather::FORMAT, &lines::FORMAT];
 
 /// Opens a file of any kind.
 fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
