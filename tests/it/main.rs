@@ -15,6 +15,7 @@ mod bucket;
 mod check;
 mod circles;
 mod cmd;
+mod columns;
 mod compensate;
 mod computed;
 mod conceal;

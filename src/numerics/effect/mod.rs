@@ -186,6 +186,11 @@ impl<'a> ArmState<'a> {
         self.data.temperature(self.row)
     }
 
+    /// A recorded circumstance, of a joint or of the whole row, SI.
+    pub fn circumstance(&self, column: &str, joint: Option<usize>) -> Option<f64> {
+        self.data.circumstance(column, self.row, joint)
+    }
+
     /// Declared payload, kg.
     pub fn payload(&self) -> f64 {
         self.data.payload[self.row]

@@ -3,7 +3,6 @@
 //! A kind predicts from where the target is: its derivative by a parameter is a linear map of how the parameter moves the point, turns
 //! the target or moves the vector from the anchor (a [`Sensitivity`]), which the effect stack says of every parameter.
 
-mod column;
 mod distance;
 mod inclination;
 mod orientation;
@@ -14,7 +13,7 @@ mod socket;
 mod sphere;
 mod weight;
 
-pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
+pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
 pub use orientation::Orientation;
