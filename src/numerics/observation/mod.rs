@@ -82,6 +82,8 @@ pub struct Rank {
     pub places: bool,
     /// Whether it sees how targets are turned.
     pub rotations: bool,
+    /// Whether it sees how large the arm is: a length was measured, or is known.
+    pub scale: bool,
     /// Translations and rotations of the whole cell that it does not see.
     pub blind: [usize; 2],
 }
@@ -196,6 +198,11 @@ pub trait MeasurementKind: Sync {
         None
     }
 
+    /// For a start where no whole points are: where the base stands, in the recording's frame.
+    fn base(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize]) -> Option<Pose> {
+        None
+    }
+
     /// For a start: where anchors are. Fails with a sentence where too little was measured from one.
     fn anchors(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize], _base: &Pose) -> Result<Vec<Anchor>, String> {
         Ok(Vec::new())
@@ -281,7 +288,7 @@ const ALONG: f64 = 0.9999;
 /// Parameters of the geometry that the rows see by theory; none where some saw axes of a point only, of which theory has no word.
 ///
 /// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor (4 for a
-/// sphere); less what moves the whole cell unseen, and its scale where targets are only brought to things and no `length` is known. Sockets
+/// sphere); less what moves the whole cell unseen, and its scale where no kind sees it and no `length` is known. Sockets
 /// whose place is known, `points` of them on no line, fix the cell: one its translations, two the scale and all turns but about their line.
 pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool, points: usize) -> Option<usize> {
     let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
@@ -318,6 +325,8 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: boo
     };
     let flat = used.iter().all(|kind| kind.about().name == PlaneKind.about().name) && setup.anchors.iter().all(along_first);
     let unplaced = if flat && robot.is_revolute(0) && points == 0 { 2 } else { 0 };
-    let scale = usize::from(used.iter().all(|kind| kind.is_brought()) && !length && points < 2);
+    // The travel of a slide is a length.
+    let slides = (0..robot.joints()).any(|joint| !robot.is_revolute(joint));
+    let scale = usize::from(used.iter().all(|kind| !kind.about().rank.scale) && !length && !slides && points < 2);
     Some(seen - scale - unplaced - if places { translations } else { 0 } - rotations)
 }
