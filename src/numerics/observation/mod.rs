@@ -6,6 +6,7 @@
 mod distance;
 mod inclination;
 mod orientation;
+mod planar;
 mod plane;
 mod point;
 mod residual;
@@ -17,6 +18,7 @@ pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Par
 pub use distance::Distance;
 pub use inclination::Inclination;
 pub use orientation::Orientation;
+pub use planar::Planar;
 pub use plane::PlaneKind;
 pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual};
@@ -33,7 +35,7 @@ use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
 pub const KINDS: &[&dyn MeasurementKind] =
-    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind];
+    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind, &Planar];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
