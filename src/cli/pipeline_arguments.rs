@@ -1,7 +1,7 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::means::{CommandTask, Means, shown};
+use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{CompletedRun, Plan, Purpose, Selection};
 use crate::store::Store;
@@ -16,7 +16,7 @@ pub(super) struct PipelineArguments {
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
     #[command(flatten)]
-    means: Means,
+    means: ExecutionArguments,
     /// Prints one JSON document on stdout
     #[arg(long)]
     pub json: bool,

@@ -9,14 +9,14 @@ mod exchange;
 mod point_jacobian;
 mod site;
 mod spread;
-mod tell;
+mod t_optimal;
 mod visit_order;
 
 pub use brought::{BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought};
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
-pub use tell::{Alternative, Contest, Discrimination, Proposed, TOLD, tell};
+pub use t_optimal::{Alternative, Contest, Discrimination, MIN_SEPARATION_L, Proposed, tell};
 
 use super::model::Model;
 use crate::robot::{Measurements, Named};
