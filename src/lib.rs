@@ -73,6 +73,8 @@
 //! | effect | `src/numerics/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
+//! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
+//! | kind of raw file | `src/stage/ingest/<name>.rs`, which hands out records | its `mod`, and one line in `FORMATS` of `src/stage/ingest/reading.rs` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
