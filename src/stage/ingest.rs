@@ -166,7 +166,7 @@ impl Stage for Ingest {
         let decided: Vec<write::JoinDecisions> = each
             .map(|((settings, (scans, fates)), names)| write::JoinDecisions { settings, arm: &arm, scans, fates, names })
             .collect();
-        let gaps: Vec<f64> = self.later.iter().map(|later| later.gap_s).collect();
+        let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
         let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })

@@ -1,6 +1,7 @@
 //! `validate` and `report`: statistics against hand-made numbers, and a document that is whole, safe and the same every time.
 
 mod browser;
+mod language;
 mod tables;
 
 use calib::stage::{Context, Labelled, OpenedInput, Report, ReportReads, Services, Sink, Stage, Validate, ValidateReads};

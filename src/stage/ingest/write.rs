@@ -30,10 +30,11 @@ pub(super) struct JoinDecisions<'a> {
     pub names: &'a [String],
 }
 
-/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s.
+/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s, none where
+/// the clock is the same.
 pub(super) fn write(
     decided: &[JoinDecisions],
-    gaps: &[f64],
+    gaps: &[Option<f64>],
     names: &[String],
     context: &Context,
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
