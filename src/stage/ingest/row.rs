@@ -9,7 +9,6 @@ use super::lines::RecordFields;
 use super::number::{self, NumberFault};
 use super::slots::KindSlots;
 use crate::robot::ONE_AND_A_HALF_TURNS;
-use crate::units::Unit;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
@@ -56,15 +55,6 @@ impl Reason {
 pub(super) struct RowRefusal {
     pub reason: Reason,
     pub detail: String,
-}
-
-/// What numbers too large for a length in this unit usually are.
-fn smaller(unit: Unit) -> &'static str {
-    match unit {
-        Unit::Millimetre => "; if the file holds micrometres, say `unit: um`",
-        Unit::Metre => "; if the file holds millimetres, say `unit: mm`",
-        _ => "",
-    }
 }
 
 fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
@@ -184,8 +174,7 @@ impl RowReader<'_> {
                         format!("{names}: `{}` {sign} `{}`", text(cell.column), text(other.column))
                     }
                 };
-                let other = if direction { "" } else { smaller(unit) };
-                return refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}{other}"));
+                return refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"));
             }
             if let Some(slot) = row.values.get_mut(cell.index) {
                 *slot = value;
