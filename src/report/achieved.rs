@@ -30,7 +30,7 @@ struct AchievedPage<'a> {
     version: &'static str,
     model: &'a str,
     points: String,
-    rows: Vec<[String; 5]>,
+    rows: Vec<[String; 4]>,
     remarks: &'a [String],
     picture: String,
     poses: Vec<[String; 4]>,
@@ -41,7 +41,7 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
     let mm = |length: f64| fixed(length, 4);
     let row = |(name, figures, what): &(&str, [f64; 3], String)| {
         let [mean, p95, max] = figures.map(mm);
-        [(*name).to_string(), mean, p95, max, what.clone()]
+        [format!("{name}: {what}"), mean, p95, max]
     };
     let errors = tables.errors.iter().zip([("before", "s0"), ("achieved", "s-last")]).map(|(lengths, (step, colour))| {
         let mut sorted_mm = lengths.clone();
