@@ -47,7 +47,9 @@ impl Phrases {
                 own if own.iter().any(|piece| !matches!(piece, Piece::Letters(_))) => {
                     patterns.push(Pattern { pieces: own, other })
                 }
-                _ => drop(whole.insert(key, other)),
+                _ => {
+                    whole.insert(key, other);
+                }
             }
         }
         patterns.sort_by_key(|pattern| std::cmp::Reverse(pattern.letters()));
@@ -206,11 +208,9 @@ fn with_comma(text: &str) -> String {
     };
     let is_point = |k: Option<usize>| k.and_then(|k| letters.get(k)) == Some(&'.');
     let decimal = |k: usize| {
-        let whole = k > 0 && digit(k - 1) && digit(k + 1);
-        letters[k] == '.'
-            && whole
-            && !is_point(run(k - 1, -1))
-            && !run(k + 1, 1).is_some_and(|end| is_point(Some(end)) && digit(end + 1))
+        let between = letters[k] == '.' && k > 0 && digit(k - 1) && digit(k + 1);
+        let more = || is_point(run(k - 1, -1)) || run(k + 1, 1).is_some_and(|end| is_point(Some(end)) && digit(end + 1));
+        between && !more()
     };
     let out: String = (0..letters.len()).map(|k| if decimal(k) { ',' } else { letters[k] }).collect();
     if out.len() == text.len() && out != text { out.replace(", ", "; ") } else { out }
