@@ -35,6 +35,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 
 /// Makes industrial robots accurate, and says why they were not: from laser-tracker recordings through pipelines of stages
 /// to an identified model and a report.
@@ -165,6 +166,11 @@ fn emit(text: &str) -> Result<()> {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store("stdout", error.to_string())),
         _ => Ok(()),
     }
+}
+
+/// Writes a page where the command line names it.
+fn write(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text).map_err(|error| Error::spec(path.display().to_string(), format!("cannot write: {error}")))
 }
 
 /// Lines of a result, folded and in colour where stdout is a terminal.

@@ -9,6 +9,7 @@ use crate::robot::{Measurements, RobotModel, Visited};
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::brought;
 use crate::stage::doubtful::{self, KnownModel};
+use crate::stage::misplaced_tool::misplaced_tool;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
@@ -95,7 +96,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 22;
+    const IMPLEMENTATION: u32 = 23;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -174,6 +175,7 @@ impl Stage for Diagnose {
                 diagnosis.statement.push_str(&format!("; {line}"));
                 context.services.warn(line);
             }
+            misplaced_tool(&diagnosis.model, &diagnosis.fitted).into_iter().for_each(|line| context.services.warn(line));
         }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];

@@ -171,7 +171,7 @@ impl Stage for Ingest {
         let decided: Vec<joined::JoinDecisions> = each
             .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
             .collect();
-        let gaps: Vec<f64> = self.later.iter().map(|later| later.gap_s).collect();
+        let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
         let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })

@@ -18,6 +18,7 @@ mod identify;
 pub mod ingest;
 mod known_cell;
 pub mod learn;
+mod misplaced_tool;
 mod named_column;
 mod optimise;
 mod own_effects;

@@ -101,7 +101,7 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJ
 }
 
 fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecision], index: usize) -> Option<Fault> {
-    let (scan, decision) = (scans.get(index)?, decisions.get(index)?);
+    let (scan, decision, layout) = (scans.get(index)?, decisions.get(index)?, settings.files.get(index)?);
     let accepted = accepted(scan, decision);
     let rejected = scan.read - accepted;
     if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
@@ -162,8 +162,22 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecisio
     };
     Some(Fault::new(
         place,
-        format!("{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}", listed.join("; ")),
+        format!(
+            "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{}",
+            listed.join("; "),
+            smaller(scan, &layout.columns)
+        ),
     ))
+}
+
+/// What points that are too large for their unit usually are, where most are.
+fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
+    let most = scan.tally.get(&Reason::OutOfRange).is_some_and(|count| 2 * count.rows > scan.read);
+    match columns.number("x").filter(|_| most).and_then(|x| x.unit.as_deref()) {
+        Some("mm") => "; if the file holds micrometres, say `unit: um`",
+        Some("m") => "; if the file holds millimetres, say `unit: mm`",
+        _ => "",
+    }
 }
 
 /// An id of each of two files that the other one lacks, where both have such: of a pair that differs in case alone, if there is one.

@@ -19,10 +19,11 @@ use crate::units::Unit;
 /// Rows of the recording in memory at once.
 const CHUNK: usize = 1 << 16;
 
-/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s.
+/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s, none where
+/// the clock is the same.
 pub(super) fn write(
     decided: &[JoinDecisions],
-    gaps: &[f64],
+    gaps: &[Option<f64>],
     names: &[String],
     context: &Context,
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
