@@ -35,6 +35,7 @@
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
 //! | [`export`] | the identified model for other programs, one file per format | compensate, effect, estimate, identified, robot, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
+//! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
@@ -163,6 +164,7 @@ pub mod stage;
 pub mod pipeline;
 
 pub mod audit;
+pub mod excitation;
 pub mod export;
 pub mod fleet;
 pub mod identified;

@@ -5,8 +5,10 @@ mod compensate;
 mod diagnose;
 mod diff;
 mod effects;
+mod excite;
 mod explain;
 mod export;
+mod feed_forward;
 mod fleet;
 mod gc;
 mod init;
@@ -53,6 +55,7 @@ enum Verb {
     Diagnose(diagnose::DiagnoseArguments),
     Effects(effects::EffectsArguments),
     Diff(diff::DiffArguments),
+    Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
     Export(export::ExportArguments),
     Init(init::InitArguments),
@@ -120,6 +123,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Fleet(verb) => fleet::main(&verb, arguments),
         Verb::Export(verb) => export::main(&verb, arguments),
         Verb::Init(verb) => return init::main(&verb),
+        Verb::Excite(verb) => excite::main(&verb),
         Verb::Explain(verb) => explain::main(&verb),
         Verb::Gc(verb) => gc::main(&verb),
         Verb::Lineage(verb) => lineage::main(&verb),
