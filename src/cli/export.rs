@@ -3,7 +3,7 @@
 use super::emit;
 use super::model_arguments::ModelArguments;
 use crate::error::{Error, Result};
-use crate::export::{Carried, Export, FORMATS, Format};
+use crate::export::{CarriedTorques, Export, FORMATS, Format};
 use crate::pipeline::Purpose;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -50,9 +50,9 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
     let identified = arguments.model.load(Purpose::Export, command_line)?;
     identified.spare(arguments.out.as_deref())?;
-    if identified.is_of_torques_alone() && arguments.format.0.carries() == Carried::Nothing {
+    if identified.is_of_torques_alone() && arguments.format.0.carries() == CarriedTorques::Nothing {
         let allowed: Vec<&str> =
-            FORMATS.iter().filter(|format| format.carries() != Carried::Nothing).map(|format| format.name()).collect();
+            FORMATS.iter().filter(|format| format.carries() != CarriedTorques::Nothing).map(|format| format.name()).collect();
         let message = format!("torques were identified, no geometry, and it holds none; allowed: {}", allowed.join(", "));
         return Err(Error::spec("--format", message));
     }

@@ -1,6 +1,6 @@
 //! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
-use super::{Carried, Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS};
 use crate::error::{Error, Result};
 use crate::identified::IdentifiedTorques;
@@ -18,8 +18,8 @@ impl Format for Dynamics {
         "Friction, inertials and all other causes of the torques with sigma, as plain JSON"
     }
 
-    fn carries(&self) -> Carried {
-        Carried::All
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::All
     }
 
     fn text(&self, export: &Export) -> Result<String> {

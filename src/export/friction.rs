@@ -1,6 +1,6 @@
 //! What formats hold of the identified torques: friction, rotor and drive of each joint. What they do not hold is listed.
 
-use super::{Carried, Export};
+use super::{CarriedTorques, Export};
 use crate::dynamics::TorqueTerm;
 use crate::effect::Place;
 use crate::identified::IdentifiedTorques;
@@ -31,16 +31,16 @@ pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
 
 impl Export {
     /// What the reader of a format must know, a sentence a line: of torques, each cause that it leaves out, with its size.
-    pub fn remarks_in(&self, carried: Carried) -> Vec<String> {
+    pub fn remarks_in(&self, carried: CarriedTorques) -> Vec<String> {
         let mut lines = self.remarks();
         let Some(torques) = &self.identified.torques else { return lines };
         let attributes = match carried {
-            Carried::All => return lines,
-            Carried::Nothing => {
+            CarriedTorques::All => return lines,
+            CarriedTorques::Nothing => {
                 lines.push("not carried: the identified torques (formats urdf, mjcf, json, dynamics)".into());
                 return lines;
             }
-            Carried::Causes(attributes) => attributes,
+            CarriedTorques::Causes(attributes) => attributes,
         };
         let holds = |term: &&TorqueTerm| {
             let named = matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());

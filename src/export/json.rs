@@ -1,6 +1,6 @@
 //! The whole model as one JSON document: description, parameters with sigma, what rigid geometry leaves out.
 
-use super::{Carried, Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Error, Result};
 use serde_json::json;
@@ -16,8 +16,8 @@ impl Format for Json {
         "Everything: description, parameters with sigma, what is left out"
     }
 
-    fn carries(&self) -> Carried {
-        Carried::All
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::All
     }
 
     fn text(&self, export: &Export) -> Result<String> {

@@ -3,7 +3,7 @@
 
 use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, gear, positive};
 use super::xml::{self, Xml, empty, numbers, offset};
-use super::{Carried, Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Result, one_line};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
@@ -23,8 +23,8 @@ impl Format for Mjcf {
         "MuJoCo model: bodies and joints at the corrected axes, the tool as a site"
     }
 
-    fn carries(&self) -> Carried {
-        Carried::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE])
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE])
     }
 
     fn text(&self, export: &Export) -> Result<String> {

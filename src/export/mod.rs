@@ -25,14 +25,14 @@ pub trait Format: Sync {
     /// The whole file. Fails where the format cannot hold this arm at all.
     fn text(&self, export: &Export) -> Result<String>;
     /// What it holds of identified torques.
-    fn carries(&self) -> Carried {
-        Carried::Nothing
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::Nothing
     }
 }
 
 /// What a format holds of identified torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Carried {
+pub enum CarriedTorques {
     /// None of it.
     Nothing,
     /// Inertials, and these causes at joints.

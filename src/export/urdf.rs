@@ -2,7 +2,7 @@
 
 use super::friction::{DAMPING, FRICTION, positive};
 use super::xml::{self, Xml, empty, numbers, offset};
-use super::{Carried, Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Result, one_line};
 use nalgebra::{Matrix3, Rotation3};
@@ -19,8 +19,8 @@ impl Format for Urdf {
         "Unified robot description: joints at the corrected axes"
     }
 
-    fn carries(&self) -> Carried {
-        Carried::Causes(&[DAMPING, FRICTION])
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::Causes(&[DAMPING, FRICTION])
     }
 
     fn text(&self, export: &Export) -> Result<String> {

@@ -128,12 +128,11 @@ impl IdentifiedModel {
         let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
         let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
         let sources: Vec<PathBuf> = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
-        let mut torques = IdentifiedTorques::of_run(manifest, step, &robot, load)?;
-        if step.is_some() || last(Parameters::KIND).is_none() {
-            if let Some(torques) = torques.take() {
-                return Ok(Self { sources, ..Self::of_torques(robot, torques)? });
-            }
-        }
+        let alone = step.is_some() || last(Parameters::KIND).is_none();
+        let torques = match IdentifiedTorques::of_run(manifest, step, &robot, load)? {
+            Some(torques) if alone => return Ok(Self { sources, ..Self::of_torques(robot, torques)? }),
+            other => other,
+        };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let parameters = Parameters::from_frame(&load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.

@@ -44,7 +44,10 @@ impl IdentifiedTorques {
                 .push("masses are identified as base parameters: no link has masses of its own, and none are exported".into());
         }
         for body in model.consistency().iter().filter(|body| !body.is_consistent()) {
-            warnings.push(format!("no body has the identified numbers of link {}: files hold the declared ones", body.link + 1));
+            warnings.push(format!(
+                "no body has the identified inertia of link {} (table body_consistency): files hold that of the nearest body",
+                body.link + 1
+            ));
         }
         let per_ampere = torque_per_ampere(robot).ok();
         let (of_the_recording, refusals) = (Vec::new(), Vec::new());

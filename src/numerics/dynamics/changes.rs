@@ -10,7 +10,7 @@ use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::rich::noise_beside;
-use super::stacked::{StackedFit, StackedNormal};
+use super::stacked::{CandidateColumns, StackedFit, StackedNormal};
 use super::types::{ContactEvent, TorqueQuestion};
 use crate::effect::Place;
 use crate::error::{Error, Result};
@@ -166,12 +166,6 @@ fn take_columns(
     problem.noise = noise_beside(problem, &forms).0;
     problem.theta.clone_from(&about.inertials);
     problem.shift(own.latency);
-}
-
-/// A form that may change: its columns, and whether both recordings have it.
-pub(super) struct CandidateColumns {
-    pub columns: std::ops::Range<usize>,
-    pub shared: bool,
 }
 
 fn candidates_columns(problem: &TorqueProblem, shared: usize) -> Vec<CandidateColumns> {

@@ -88,7 +88,7 @@ impl TorqueModel {
             from_current: false,
         };
         let rate = (rows - 1) as f64 / (motion.time[rows - 1] - motion.time[0]);
-        let clock = RecordingClock { rate, stretches: vec![0..rows] };
+        let clock = RecordingClock { rate, stretches: std::iter::once(0..rows).collect() };
         let mut scene = DynamicScene::new(arm, &recording, &clock, self.cutoff, false);
         scene.sign_width = self.sign_width;
         let begun = motion.since_start.unwrap_or(LONG_AGO);

@@ -1,17 +1,24 @@
 //! Two recordings in one system of normal equations: what is common to both, and groups of numbers that only the second one has besides.
 
-use super::changes::CandidateColumns;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::regressor::TorqueColumn;
 use super::weighted::{WeightedColumns, dot};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// -2 ln of how common a change is beside none.
+const PRICE: f64 = 6.0;
 /// Of a number's own information: what is known of it beforehand.
 const UNKNOWN: f64 = 1e-9;
 
+/// A form that may change: its columns, and whether both recordings have it.
+pub(super) struct CandidateColumns {
+    pub columns: std::ops::Range<usize>,
+    pub shared: bool,
+}
+
 /// Numbers that change together.
-struct Group {
+struct ChangeGroup {
     /// Form of the problems; none: the last link's inertial numbers.
     form: Option<usize>,
     /// Columns of the normal equations.
@@ -25,7 +32,7 @@ pub(super) struct StackedNormal {
     /// Of the measured torques with themselves.
     square: f64,
     common: usize,
-    groups: Vec<Group>,
+    groups: Vec<ChangeGroup>,
     /// Rows of a joint in both.
     rows: usize,
     /// Columns of the second problem behind the numbers of the system.
@@ -49,10 +56,10 @@ impl StackedNormal {
         let base = problems[0].all.base;
         let shared = candidates.iter().filter(|one| one.shared).map(|one| one.columns.end).max().unwrap_or(base);
         let payload = payload_columns(&problems[1]);
-        let mut groups = vec![Group { form: None, columns: shared..shared + payload.len() }];
+        let mut groups = vec![ChangeGroup { form: None, columns: shared..shared + payload.len() }];
         let mut width = shared + payload.len();
         for (form, one) in candidates.iter().enumerate() {
-            groups.push(Group { form: Some(form), columns: width..width + one.columns.len() });
+            groups.push(ChangeGroup { form: Some(form), columns: width..width + one.columns.len() });
             width += one.columns.len();
         }
         // Whitened columns of each number in the second recording; of the first only common ones.
@@ -100,7 +107,7 @@ impl StackedNormal {
 
     /// What a group must gain.
     pub fn penalty(&self, group: usize) -> f64 {
-        self.groups[group].columns.len() as f64 * (self.rows as f64).ln() + 2.0 * (self.groups.len() as f64).ln()
+        PRICE + self.groups[group].columns.len() as f64 * (self.rows as f64).ln() + 2.0 * (self.groups.len() as f64).ln()
     }
 
     /// Common numbers and some groups.

@@ -6,8 +6,9 @@ use calib::audit::QueryTables;
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Table, TorqueChangeRow, TorqueChangeTable};
-use calib::twin::torque::TorqueCase;
-use std::path::Path;
+use calib::twin::torque::{TorqueCase, TorqueDesign};
+use serde_json::json;
+use std::path::{Path, PathBuf};
 
 /// Both cases through the pipeline of pairs.
 fn compared(before: &TorqueCase, after: &TorqueCase) -> Vec<TorqueChangeRow> {
@@ -15,23 +16,29 @@ fn compared(before: &TorqueCase, after: &TorqueCase) -> Vec<TorqueChangeRow> {
     let at = |name: &str| folder.path().join(name);
     write(&at("before"), &before.recording());
     write(&at("after"), &after.recording());
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics_pair/pipeline.yaml");
     let sets = ["before", "after"].map(|name| format!("{name}={}", at(name).display()));
-    let arguments = ["run", "--quiet", "--set", &sets[0], "--set", &sets[1], &pipeline.display().to_string()];
-    let output = calib(&arguments, &at("store"));
+    changes_of(&["--set", &sets[0], "--set", &sets[1]])
+}
+
+/// What the pipeline of pairs says with some settings.
+fn changes_of(settings: &[&str]) -> Vec<TorqueChangeRow> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipeline = pair().join("pipeline.yaml").display().to_string();
+    let output = calib(&[&["run", "--quiet", &pipeline], settings].concat(), folder.path());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let store = Store::open(&at("store")).expect("the store");
+    let store = Store::open(folder.path()).expect("the store");
     let run = find_run(&store, "HEAD").expect("a run");
-    let tables = QueryTables::of(&Manifest::of(&store, &run).expect("its record"))
-        .find("compare_torques/changes")
-        .expect("a table")
-        .table
-        .clone();
-    let TorqueChangeTable(rows) = TorqueChangeTable::from_frame(&store.load(&tables).expect("columns")).expect("rows");
+    let tables = QueryTables::of(&Manifest::of(&store, &run).expect("its record"));
+    let table = tables.find("compare_torques/changes").expect("a table").table.clone();
+    let TorqueChangeTable(rows) = TorqueChangeTable::from_frame(&store.load(&table).expect("columns")).expect("rows");
     for row in rows.iter().filter(|row| row.rank.is_some()) {
         println!("{}: {} +- {} {}, probability {}", row.name, row.change, row.sigma, row.unit, row.probability);
     }
     rows
+}
+
+fn pair() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics_pair")
 }
 
 fn row<'a>(rows: &'a [TorqueChangeRow], name: &str) -> &'a TorqueChangeRow {
@@ -86,4 +93,27 @@ fn an_arm_that_did_not_change_is_said_to_be_the_same() {
     let rows = compared(&before, &before.clone().on_other_paths(5079, 48.0));
     assert_eq!(changed(&rows), Vec::<&str>::new());
     assert!(rows.iter().all(|row| row.rank.is_none() && row.sigma.is_finite()));
+}
+
+/// `CALIB_UPDATE=1` makes the example anew: the arm of `pipelines/dynamics/example` with a tool that its file does not declare.
+#[test]
+fn the_example_of_a_pair_shows_the_tool_that_was_added() {
+    let example = pair().join("example");
+    let (mass, shift) = (1.2, [0.0, 0.0, -0.02]);
+    if std::env::var_os("CALIB_UPDATE").is_some() {
+        let design = TorqueDesign { seed: 11, nulls: 0.0, other_forms: 0.0, most: 1, seconds: 24.0, rate: 50.0 };
+        let before = TorqueCase::draw(&design, 0);
+        let declared = before.last_bodies().1.expect("a payload");
+        let after = before.on_other_paths(12, 24.0).carrying(mass, shift);
+        let centre: [f64; 3] = std::array::from_fn(|axis| declared.centre[axis] + (declared.mass + mass) * shift[axis] / mass);
+        let truth = json!({ "payload_kg": mass, "centre_m": centre });
+        let truth = serde_json::to_string_pretty(&truth).expect("JSON") + "\n";
+        write(&example, &[after.recording()[1].clone(), ("truth.json", truth)]);
+    }
+    let truth = super::json(example.join("truth.json"));
+    let rows = changes_of(&[]);
+    let found = row(&rows, "payload.mass");
+    let mass = truth["payload_kg"].as_f64().expect("kg");
+    assert_eq!(found.rank, Some(1));
+    assert!((found.change - mass).abs() < 4.0 * found.sigma && found.sigma < 0.1 * mass, "{} +- {}", found.change, found.sigma);
 }

@@ -1,6 +1,6 @@
 //! What a diagnosis of torques is good for: files for simulators and torques that are fed forward, held against the twin's truth.
 
-use super::{diagnose, write};
+use super::write;
 use calib::twin::torque::{TorqueCase, TorqueDesign, TorqueRows};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,9 @@ fn solved() -> &'static Solved {
         let case = case.with_stribeck(1, size, 0.08);
         let folder = tempfile::tempdir().expect("a folder");
         write(&folder.path().join("case"), &case.recording());
-        let output = diagnose(&folder.path().join("case"), &folder.path().join("store"), &[]);
+        let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml").display().to_string();
+        let set = format!("case={}", folder.path().join("case").display());
+        let output = calib(&["run", "--quiet", "--set", &set, &pipeline], &folder.path().join("store"));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         Solved { folder, case }
     })

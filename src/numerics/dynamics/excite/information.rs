@@ -49,7 +49,7 @@ pub(super) fn base_of(arm: &DynamicArm, basis: &SeriesBasis, series: &JointSerie
         from_current: false,
     };
     let rate = (rows - 1) as f64 / (recording.time[rows - 1] - recording.time[0]);
-    let clock = RecordingClock { rate, stretches: vec![0..rows] };
+    let clock = RecordingClock { rate, stretches: std::iter::once(0..rows).collect() };
     let scene = DynamicScene::new(arm, &recording, &clock, CUTOFF, true);
     base_parameters(&ReducedRegressor::of(&scene, &Reduction::new(&clock, CUTOFF)))
 }
