@@ -101,16 +101,16 @@ impl<'a> Trajectory<'a> {
         let time = &self.motion.time;
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let usual = crate::statistics::nearest(&mut steps, 0.5).unwrap_or(0.0);
-        for (row, pair) in time.windows(2).enumerate() {
-            let (step, line) = (pair[1] - pair[0], self.lines[row + 1].0);
-            let message = if step <= 0.0 {
-                format!("the time does not increase: {} s after {} s", pair[1], pair[0])
-            } else if (step - usual).abs() > UNEVEN * usual {
-                format!("the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps")
-            } else {
-                continue;
-            };
-            return Err(Error::data(format!("{place}:{line}"), message));
+        let wrong = |row: usize, message: String| Err(Error::data(format!("{place}:{}", self.lines[row + 1].0), message));
+        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| pair[1] <= pair[0]) {
+            return wrong(row, format!("the time does not increase: {} s after {} s", pair[1], pair[0]));
+        }
+        let uneven = |pair: &[f64]| (pair[1] - pair[0] - usual).abs() > UNEVEN * usual;
+        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| uneven(pair)) {
+            let step = pair[1] - pair[0];
+            let message =
+                format!("the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps");
+            return wrong(row, message);
         }
         Ok(())
     }

@@ -62,6 +62,11 @@ fn number(element: &roxmltree::Node, name: &str) -> f64 {
     element.attribute(name).unwrap_or_else(|| panic!("no {name}")).parse().expect("a number")
 }
 
+/// How near friction is asked for: at joint 2 Stribeck friction, which no attribute holds, shares it with viscous and Coulomb friction.
+fn share(joint: usize) -> f64 {
+    if joint == 1 { 0.2 } else { 0.05 }
+}
+
 fn near(found: f64, truth: f64, share: f64, what: &str) {
     assert!((found - truth).abs() <= share * truth.abs(), "{what}: {found}, truly {truth}");
 }
@@ -84,8 +89,18 @@ fn a_urdf_of_torques_holds_the_friction_and_the_masses_of_the_twin() {
     let truth = solved().case.plain_friction();
     assert_eq!(all.len(), truth.len());
     for (joint, (dynamics, [viscous, coulomb])) in all.iter().zip(truth).enumerate() {
-        near(number(dynamics, "damping"), viscous.expect("viscous"), 0.08, &format!("viscous friction of joint {}", joint + 1));
-        near(number(dynamics, "friction"), coulomb.expect("Coulomb"), 0.08, &format!("Coulomb friction of joint {}", joint + 1));
+        near(
+            number(dynamics, "damping"),
+            viscous.expect("viscous"),
+            share(joint),
+            &format!("viscous friction of joint {}", joint + 1),
+        );
+        near(
+            number(dynamics, "friction"),
+            coulomb.expect("Coulomb"),
+            share(joint),
+            &format!("Coulomb friction of joint {}", joint + 1),
+        );
     }
     let last = file.descendants().find(|node| node.attribute("name") == Some("link_6")).expect("the last link");
     let mass = last.descendants().find(|node| node.has_tag_name("mass")).expect("its mass");
@@ -101,7 +116,12 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
     let joints: Vec<_> = file.descendants().filter(|node| node.has_tag_name("joint")).collect();
     assert_eq!(joints.len(), truth.len());
     for (joint, (element, [viscous, coulomb])) in joints.iter().zip(truth).enumerate() {
-        near(number(element, "damping"), viscous.expect("viscous"), 0.08, &format!("viscous friction of joint {}", joint + 1));
+        near(
+            number(element, "damping"),
+            viscous.expect("viscous"),
+            share(joint),
+            &format!("viscous friction of joint {}", joint + 1),
+        );
         near(
             number(element, "frictionloss"),
             coulomb.expect("Coulomb"),
