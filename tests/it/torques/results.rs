@@ -125,7 +125,7 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
         near(
             number(element, "frictionloss"),
             coulomb.expect("Coulomb"),
-            0.08,
+            share(joint),
             &format!("Coulomb friction of joint {}", joint + 1),
         );
     }
