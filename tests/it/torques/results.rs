@@ -64,7 +64,7 @@ fn number(element: &roxmltree::Node, name: &str) -> f64 {
 
 /// How near friction is asked for: at joint 2 Stribeck friction, which no attribute holds, shares it with viscous and Coulomb friction.
 fn share(joint: usize) -> f64 {
-    if joint == 1 { 0.2 } else { 0.05 }
+    if joint == 1 { 0.2 } else { 0.08 }
 }
 
 fn near(found: f64, truth: f64, share: f64, what: &str) {
