@@ -5,9 +5,11 @@ mod compensate;
 mod diagnose;
 mod diff;
 mod effects;
+mod excite;
 mod execution_arguments;
 mod explain;
 mod export;
+mod feed_forward;
 mod fleet;
 mod gc;
 mod init;
@@ -54,6 +56,7 @@ enum Verb {
     Diagnose(diagnose::DiagnoseArguments),
     Effects(effects::EffectsArguments),
     Diff(diff::DiffArguments),
+    Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
     Export(export::ExportArguments),
     Init(init::InitArguments),
@@ -121,6 +124,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Fleet(verb) => fleet::main(&verb, arguments),
         Verb::Export(verb) => export::main(&verb, arguments),
         Verb::Init(verb) => return init::main(&verb),
+        Verb::Excite(verb) => excite::main(&verb),
         Verb::Explain(verb) => explain::main(&verb),
         Verb::Gc(verb) => gc::main(&verb),
         Verb::Lineage(verb) => lineage::main(&verb),

@@ -4,6 +4,7 @@ mod advice;
 mod blank_payload;
 mod brought;
 mod compare;
+mod compare_torques;
 mod computed;
 mod copied;
 mod curves;
@@ -34,13 +35,16 @@ mod simulate;
 pub mod split;
 mod stiffness;
 mod text_file;
+mod torque_signal;
 mod transfer;
 mod validate;
 mod weightless;
 
 pub use compare::{Compare, CompareReads};
+pub use compare_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use diagnose_torques::{DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting};
+pub(crate) use dynamic_arm::{dynamic_arm, torque_per_ampere};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
@@ -351,6 +355,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),

@@ -1,7 +1,10 @@
 //! Torques of moving arms through the real command: practice recordings, recordings of the twin, bad input.
 
+mod changes;
 mod concealed;
+mod excite;
 mod hostile;
+mod results;
 
 use crate::desk::shared;
 use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};

@@ -1,5 +1,6 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
+use super::model::TorqueModel;
 use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
 
@@ -233,4 +234,6 @@ pub struct TorqueDiagnosis {
     pub inertials: Vec<InertialEstimate>,
     /// Of joints with friction found.
     pub friction: Vec<FrictionCurve>,
+    /// All that was identified, as torques are predicted with it.
+    pub model: TorqueModel,
 }

@@ -314,7 +314,7 @@ fn scattered(stated: &Machine, noise: &mut Noise) -> Machine {
 }
 
 /// Sines to fit, moves to fit, sines and moves that judge.
-fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
+pub(super) fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()

@@ -31,7 +31,7 @@ pub struct TorqueRows {
 
 impl TorqueCase {
     /// The bodies as they are: off within the tolerance, and by those laws that change bodies.
-    fn true_machine<'a>(&self, laws: impl Iterator<Item = &'a Law>) -> Machine {
+    pub(super) fn true_machine<'a>(&self, laws: impl Iterator<Item = &'a Law>) -> Machine {
         let mut machine = self.scattered.clone();
         for law in laws {
             law.change(&mut machine);
