@@ -164,7 +164,14 @@ impl Stage for Diagnose {
             beside_simulation: corrected == Corrected::OutsideSimulation,
             seed: context.seed,
         };
-        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
+        context.services.begin("looking for what the model lacks", None, "steps");
+        let mut steps = 0;
+        let tell = |line: String| {
+            steps += 1;
+            context.services.note(line.clone());
+            context.services.advance(steps, &line);
+        };
+        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = said(diagnosis, &question, context)?;
         blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
