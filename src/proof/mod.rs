@@ -8,4 +8,4 @@ mod set;
 pub use marks::{board, write_scoreboard};
 pub use recorded::recorded;
 pub use seal::{RECORDINGS, SEAL, SEALED, Seal};
-pub use set::{conceal, vacant};
+pub use set::{ConcealedSet, conceal, vacant};

@@ -1,9 +1,10 @@
 //! Torques of a moving arm whose truth is known: recordings of currents or torque sensors with concealed physics.
 //!
 //! [`rigid`] moves bodies and adds what they take about each axis, `path` moves the joints, `law` holds what is concealed, `draw` draws
-//! a case of a seed, `record` measures it, `visible` says how much of each effect data can show, `folder` writes the files.
+//! a case of a seed, `family` an effect, `record` measures it, `visible` says how much of each effect data can show, `folder` writes the files.
 
 mod draw;
+mod family;
 mod folder;
 mod law;
 mod names;

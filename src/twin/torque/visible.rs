@@ -2,7 +2,7 @@
 //! effects have absorbed what they can; and which other names would say the same.
 
 use super::draw::TorqueCase;
-use super::law::{Law, Moment};
+use super::law::{Fall, Law, Moment};
 use super::record::{LASTS, TorqueRows};
 use super::rigid::Machine;
 
@@ -124,7 +124,7 @@ impl<'a> Columns<'a> {
             for law in per_joint(joint) {
                 add(&law, vec![self.of_law(&law)]);
             }
-            let law = Law::TorqueConstant { joint, share: 0.0 };
+            let law = Law::TorqueConstant { joint, share: 0.0, half: f64::INFINITY };
             let own = self.rows.torque.iter().enumerate().map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
             if !self.case.sensors {
                 add(&law, vec![self.of(own)]);
@@ -172,15 +172,15 @@ fn per_joint(joint: usize) -> Vec<Law> {
     vec![
         Law::Viscous { joint, size: 1.0, exponent: 1.0 },
         Law::Coulomb { joint, size: 1.0, width },
-        Law::Asymmetric { joint, size: 1.0, width },
-        Law::Stribeck { joint, size: 1.0, speed: 0.05, exponent: 1.0 },
-        Law::Stribeck { joint, size: 1.0, speed: 0.1, exponent: 1.0 },
+        Law::Asymmetric { joint, size: 1.0, width, by_speed: 0.0 },
+        Law::Stribeck { joint, size: 1.0, speed: 0.05, fall: Fall::Exponential(1.0) },
+        Law::Stribeck { joint, size: 1.0, speed: 0.1, fall: Fall::Exponential(1.0) },
         Law::Load { joint, share: 1.0, exponent: 1.0, width },
         Law::Rotor { joint, inertia: 1.0 },
         Law::Offset { joint, size: 1.0 },
         Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2 },
+        Law::Spring { joint, size: 1.0, zero: 0.0, gas: 0.0 },
+        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2, gas: 0.0 },
     ]
 }
 
