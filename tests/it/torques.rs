@@ -2,6 +2,7 @@
 
 mod concealed;
 mod hostile;
+mod rigid;
 
 use crate::desk::shared;
 use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};

@@ -95,6 +95,7 @@ impl Law {
     /// What it may be called besides, at its place: a curve that no library has is also one of its kind.
     pub(super) fn kin(&self) -> &'static [&'static str] {
         match self {
+            Self::Viscous { exponent, .. } if *exponent != 1.0 => &["unknown", "stribeck_friction"],
             Self::SpeedCurve { .. } => &["stribeck_friction"],
             Self::AngleCurve { .. } => &["torque_ripple"],
             _ => &[],

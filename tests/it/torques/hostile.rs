@@ -48,7 +48,8 @@ impl Sheet {
 
 /// An arm with motor currents.
 fn case() -> (TorqueCase, Sheet) {
-    let case = (0..20).map(|number| TorqueCase::draw(&nothing(5), number)).find(|case| case.robot.name == "compact6").expect("one");
+    let case =
+        (0..20).map(|number| TorqueCase::draw(&nothing(5), number)).find(|case| case.robot.name == "compact6").expect("one");
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }
