@@ -1,6 +1,6 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
-use super::set::ConcealedSet;
+use super::concealed_set::ConcealedSet;
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use serde::{Deserialize, Serialize};
