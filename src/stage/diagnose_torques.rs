@@ -25,7 +25,8 @@ pub struct DiagnoseTorques {
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
     pub inertials: InertialSetting,
-    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from the recording.
+    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from how fast the joints come and go,
+    /// from 10 Hz to a tenth of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cutoff_hz: Option<f64>,
     /// Causes that are not tried and never named.

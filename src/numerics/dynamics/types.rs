@@ -9,7 +9,8 @@ use crate::effect::Place;
 pub struct TorqueQuestion {
     /// Whether masses are identified without regard to what is declared.
     pub free_inertials: bool,
-    /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from the rate of the recording.
+    /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from how fast the joints come
+    /// and go.
     pub cutoff: Option<f64>,
     /// Names of causes that are not tried.
     pub without: Vec<String>,

@@ -66,13 +66,16 @@ impl TorqueCase {
                 laws.iter().zip(&mut past).for_each(|(law, past)| law.add(&now, past, &mut torque));
                 for law in &laws {
                     match law {
-                        Law::Contact { start, end, force } if (*start..*end).contains(&(begin + time)) => {
-                            let rises = std::f64::consts::PI * (begin + time - start) / (end - start);
-                            let push = force.map(|f| f * rises.sin());
+                        Law::Contact { start, end, force, held } if (*start..*end).contains(&(begin + time)) => {
+                            let part = (begin + time - start) / (end - start);
+                            let wave = (std::f64::consts::PI * part).sin();
+                            let push = force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
                             let against = machine.against(&state.q, push);
                             torque.iter_mut().zip(against).for_each(|(torque, against)| *torque += against);
                         }
-                        Law::TorqueConstant { joint, share } => torque[*joint] *= 1.0 + share,
+                        Law::TorqueConstant { joint, share, half } => {
+                            torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
+                        }
                         _ => {}
                     }
                 }
