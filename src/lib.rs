@@ -22,7 +22,7 @@
 //! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
-//! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
+//! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, observation, robot, spatial |
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, estimate, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
@@ -33,8 +33,9 @@
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, effect, estimate, identified, robot, yaml |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, dynamics, effect, estimate, identified, robot, table, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
+//! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
@@ -73,6 +74,8 @@
 //! | effect | `src/numerics/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
+//! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
+//! | kind of raw file | `src/stage/ingest/<name>.rs`, which hands out records | its `mod`, and one line in `FORMATS` of `src/stage/ingest/reading.rs` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
@@ -163,6 +166,7 @@ pub mod stage;
 pub mod pipeline;
 
 pub mod audit;
+pub mod excitation;
 pub mod export;
 pub mod fleet;
 pub mod identified;

@@ -192,7 +192,10 @@ impl Observer for Progress {
     }
 
     fn note(&self, id: &str, line: &str) {
-        self.detail(id, &format!("  {line}"));
+        if self.verbosity == Verbosity::Detailed {
+            self.print(id, &format!("  {line}"));
+            self.state().said = Instant::now();
+        }
     }
     fn warn(&self, id: &str, line: &str) {
         let first = self.state().warned.insert(line.into());

@@ -1,6 +1,6 @@
 //! `calib check`: whether a pipeline can run: what is still to fill in and to look at, every fault at once, and with `--data` what a first fit says.
 
-use super::means::{CommandTask, Means};
+use super::execution_arguments::{CommandTask, ExecutionArguments};
 use super::{emit, emit_lines};
 use crate::error::{Error, Result, counted};
 use crate::init::{MarkedLines, marked};
@@ -28,7 +28,7 @@ pub(super) struct CheckArguments {
     #[arg(value_name = "PIPELINE")]
     pipeline: PathBuf,
     #[command(flatten)]
-    means: Means,
+    means: ExecutionArguments,
     /// Reads the recording and fits base and geometry to it; what is computed is kept in the store, for the run
     #[arg(long)]
     data: bool,

@@ -1,5 +1,6 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
+use super::feed_forward::{FeedForward, feed_forward};
 use super::model_arguments::ModelArguments;
 use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters};
 use crate::error::{Error, Fault, Result, counted};
@@ -38,6 +39,11 @@ use std::path::{Path, PathBuf};
 /// computes, Offs and RelTool of RAPID among them (the controller adds the offset to the corrected target, so that the shifted point
 /// gets the correction of the unshifted one). Warnings also name the lines that move by a distance
 /// (PTP_REL, LIN_REL) or move external axes.
+///
+/// With --torque the targets are a planned motion in even steps of time (time_s, q1_deg .., where given dq1_deg_s .. and ddq1_deg_s2 ..), and
+/// the answer is the torque that each row needs by the model of `diagnose_torques` (tau1_nm .., and i1_a .. where motors are declared), to be
+/// fed forward: masses, friction and all other causes, but for latency and contacts, which belong to the recording. Without dq and ddq
+/// positions are differentiated as those of the recording were. `remark` names rows beyond the recorded positions, speeds and accelerations.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CompensateArguments {
@@ -101,6 +107,13 @@ pub(super) struct CompensateArguments {
     /// Unit of lengths whose column does not name one: mm, m
     #[arg(long, value_name = "UNIT")]
     length: Option<String>,
+    /// Torques that a planned motion needs, instead of corrected targets
+    #[arg(long, conflicts_with_all = ["target", "orientation", "one_step", "plain", "leave_partial", "payload", "max_correction", "max_turn",
+          "max_uncertainty", "assume_frames", "temperature", "time", "direction", "start", "angle", "length", "no_sigma"])]
+    torque: bool,
+    /// Seconds from when the arm began to move to the first row, for friction that falls as gears warm up [default: the arm is warm]
+    #[arg(long, value_name = "S", requires = "torque")]
+    since_start: Option<f64>,
     /// Leaves out the uncertainty of each target
     #[arg(long)]
     no_sigma: bool,
@@ -123,12 +136,22 @@ const EXAMPLES: &str = "Examples:
   calib compensate latest targets.parquet --out corrected.parquet
   calib compensate pipeline.yaml poses.csv --target pose --payload 120 --out corrected.csv
   calib compensate pipeline.yaml weld.src --payload 80 --out weld_corrected.src
+  calib compensate pipelines/dynamics/pipeline.yaml motion.csv --torque --out feed_forward.csv
   calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
 
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
     let identified = arguments.model.load(Purpose::Compensate, command_line)?;
     identified.spare(arguments.out.as_deref())?;
+    if arguments.torque {
+        let (motion, out) = (arguments.targets.as_path(), arguments.out.as_deref());
+        let asked = FeedForward { motion, out, since_start: arguments.since_start, quiet: arguments.model.quiet };
+        return feed_forward(&asked, &identified);
+    }
+    if identified.is_of_torques_alone() {
+        let message = "torques were identified, no positions: there is nothing to correct targets with; --torque gives the torques of a motion";
+        return Err(Error::spec(&identified.origin, message));
+    }
     let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = identified.uncertainty(&arm);
@@ -174,6 +197,9 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
     }
     let payload = arguments.payload.and_then(|payload| Stated::Payload.fault(payload));
     faults.extend(payload.map(|message| Fault::new("--payload", message)));
+    if let Some(since) = arguments.since_start.filter(|since| !(since.is_finite() && *since >= 0.0)) {
+        faults.push(Fault::new("--since-start", format!("expected 0 or more, s, found {since}")));
+    }
     let limits = [("--max-correction", arguments.max_correction), ("--max-turn", arguments.max_turn)];
     for (option, given) in limits.into_iter().chain(arguments.max_uncertainty.map(|most| ("--max-uncertainty", most))) {
         if !(given.is_finite() && given > 0.0) {

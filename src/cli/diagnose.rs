@@ -1,6 +1,6 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::means::{CommandTask, Means, shown};
+use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use super::pipeline_arguments::told_as;
 use super::run::WRONG_SETUP;
 use super::{complain, emit_json, emit_lines};
@@ -30,7 +30,7 @@ pub(super) struct DiagnoseArguments {
     #[arg(long, value_name = "STAGE")]
     step: Option<String>,
     #[command(flatten)]
-    means: Means,
+    means: ExecutionArguments,
     /// Writes the formula proposed for a finding without a name as an effect of your own, which `diagnose` takes by
     /// `with: {effects: [FILE]}`
     #[arg(long, value_name = "FILE")]

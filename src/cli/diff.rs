@@ -1,7 +1,7 @@
 //! `calib diff`: two tables or two runs compared; exit code 0 same, 1 different beyond tolerance, 2 could not compare.
 
 use super::surroundings::open_store;
-use super::{complain, emit, emit_json};
+use super::{complain, emit, emit_json, write};
 use crate::audit::{RunAddress, compare_runs};
 use crate::diff::{self, Detail, DiffOptions, TableDiff};
 use crate::error::{Error, Result};
@@ -231,8 +231,4 @@ fn json(diff: &TableDiff) -> Result<serde_json::Value> {
     let mut value = serde_json::to_value(diff).map_err(|error| Error::Bug(error.to_string()))?;
     value["same"] = diff.is_same().into();
     Ok(value)
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|error| Error::spec(path.display().to_string(), format!("cannot write: {error}")))
 }

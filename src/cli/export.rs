@@ -3,7 +3,7 @@
 use super::emit;
 use super::model_arguments::ModelArguments;
 use crate::error::{Error, Result};
-use crate::export::{Export, FORMATS, Format};
+use crate::export::{CarriedTorques, Export, FORMATS, Format};
 use crate::pipeline::Purpose;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -15,6 +15,9 @@ use std::path::PathBuf;
 ///
 /// Formats carry rigid geometry; what they cannot carry (ratios, compliance, cyclic errors, a learned correction) is listed with what it does to
 /// the point, in the file and on stderr. `calib compensate` uses all of it.
+///
+/// Of a diagnosis of torques URDF carries viscous and Coulomb friction and the identified inertials, MJCF rotor inertias and drives too; what
+/// they cannot carry (Stribeck friction, friction of load, ripple) is listed with its size. All of it with sigma is in `dynamics`.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ExportArguments {
@@ -41,11 +44,18 @@ fn formats() -> impl TypedValueParser<Value = Chosen> {
 const EXAMPLES: &str = "Examples:
   calib export pipeline.yaml --format urdf --out corrected.urdf
   calib export latest --format mdh --step geometry
+  calib export pipelines/dynamics/pipeline.yaml --format mjcf --out arm.xml
   calib export parameters.parquet --robot robot.yaml --format controller";
 
 pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
     let identified = arguments.model.load(Purpose::Export, command_line)?;
     identified.spare(arguments.out.as_deref())?;
+    if identified.is_of_torques_alone() && arguments.format.0.carries() == CarriedTorques::Nothing {
+        let allowed: Vec<&str> =
+            FORMATS.iter().filter(|format| format.carries() != CarriedTorques::Nothing).map(|format| format.name()).collect();
+        let message = format!("torques were identified, no geometry, and it holds none; allowed: {}", allowed.join(", "));
+        return Err(Error::spec("--format", message));
+    }
     let export = Export::of(identified, arguments.model.force);
     let text = arguments.format.0.text(&export)?;
     match &arguments.out {
@@ -54,7 +64,7 @@ pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Re
         None => emit(&text)?,
     }
     if !arguments.model.quiet {
-        let said: String = export.remarks().iter().map(|line| format!("{line}\n")).collect();
+        let said: String = export.remarks_in(arguments.format.0.carries()).iter().map(|line| format!("{line}\n")).collect();
         let _ = std::io::stderr().write_all(said.as_bytes());
     }
     Ok(())

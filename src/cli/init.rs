@@ -19,7 +19,7 @@ pub(super) struct InitArguments {
     /// The folder for robot.yaml and pipeline.yaml
     #[arg(value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Recordings, delimited text or workbooks (.xlsx): one file, or the controller's and the tracker's
+    /// Recordings, delimited text or workbooks (.xlsx): one file, the controller's and the tracker's, or a tracker's for each of several reflectors
     #[arg(long, short, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
     /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace

@@ -5,14 +5,16 @@ mod compensate;
 mod diagnose;
 mod diff;
 mod effects;
+mod excite;
+mod execution_arguments;
 mod explain;
 mod export;
+mod feed_forward;
 mod fleet;
 mod gc;
 mod init;
 mod lineage;
 mod log;
-mod means;
 mod model_arguments;
 mod paint;
 mod panics;
@@ -35,6 +37,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 
 /// Makes industrial robots accurate, and says why they were not: from laser-tracker recordings through pipelines of stages
 /// to an identified model and a report.
@@ -53,6 +56,7 @@ enum Verb {
     Diagnose(diagnose::DiagnoseArguments),
     Effects(effects::EffectsArguments),
     Diff(diff::DiffArguments),
+    Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
     Export(export::ExportArguments),
     Init(init::InitArguments),
@@ -120,6 +124,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Fleet(verb) => fleet::main(&verb, arguments),
         Verb::Export(verb) => export::main(&verb, arguments),
         Verb::Init(verb) => return init::main(&verb),
+        Verb::Excite(verb) => excite::main(&verb),
         Verb::Explain(verb) => explain::main(&verb),
         Verb::Gc(verb) => gc::main(&verb),
         Verb::Lineage(verb) => lineage::main(&verb),
@@ -165,6 +170,11 @@ fn emit(text: &str) -> Result<()> {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store("stdout", error.to_string())),
         _ => Ok(()),
     }
+}
+
+/// Writes a page where the command line names it.
+fn write(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text).map_err(|error| Error::spec(path.display().to_string(), format!("cannot write: {error}")))
 }
 
 /// Lines of a result, folded and in colour where stdout is a terminal.

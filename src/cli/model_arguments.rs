@@ -1,6 +1,6 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
-use super::means::{CommandTask, Means, shown};
+use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use crate::compensate::{Gate, GateLimits};
 use crate::error::{Error, Fault, Result};
 use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
@@ -41,7 +41,7 @@ pub(super) struct ModelArguments {
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
-    means: Means,
+    means: ExecutionArguments,
     /// Prints no progress and no summary; warnings and errors remain
     #[arg(long, short)]
     pub quiet: bool,

@@ -1,9 +1,10 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::means::{CommandTask, Means, shown};
+use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{CompletedRun, Plan, Purpose, Selection};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, Selection};
+use crate::stage::{Report, Stage};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;
@@ -16,7 +17,7 @@ pub(super) struct PipelineArguments {
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
     #[command(flatten)]
-    means: Means,
+    means: ExecutionArguments,
     /// Prints one JSON document on stdout
     #[arg(long)]
     pub json: bool,
@@ -26,8 +27,17 @@ pub(super) struct PipelineArguments {
 }
 
 impl PipelineArguments {
-    pub fn plan(&self) -> Result<Plan> {
-        self.means.plan(&self.pipeline)
+    /// The pipeline, its reports in another language where one is given.
+    pub fn plan(&self, language: Option<&str>) -> Result<Plan> {
+        let plan = self.means.plan(&self.pipeline)?;
+        let Some(language) = language else { return Ok(plan) };
+        let reports = plan.stages.iter().filter(|stage| stage.entry.name == Report::NAME);
+        let sets: Vec<Override> =
+            reports.map(|stage| Override { target: format!("{}.language", stage.id), value: language.into() }).collect();
+        if sets.is_empty() {
+            return Err(Error::spec("--language", format!("{} has no stage `{}`", self.pipeline.display(), Report::NAME)));
+        }
+        self.means.plan_with(&self.pipeline, &sets)
     }
 
     pub fn store(&self) -> Result<Store> {

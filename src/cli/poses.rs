@@ -149,10 +149,10 @@ fn sockets_of(text: &str) -> Result<SocketPlaces, String> {
 
 /// Lower and upper ends; infinite where left empty.
 #[derive(Debug, Clone)]
-struct Ranges(Vec<[f64; 2]>);
+pub(super) struct Ranges(pub Vec<[f64; 2]>);
 
 /// `-10:10,:5,3:` -> ranges.
-fn ranges(text: &str) -> Result<Ranges, String> {
+pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
     let end = |text: &str, free: f64| match text.trim() {
         "" => Ok(free),
         number => number.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| format!("`{number}` is no number")),

@@ -6,10 +6,12 @@ use crate::error::{Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
 use crate::raw::ending;
+use crate::report::PageLanguage;
 use crate::store::Store;
 use crate::summary::{self, LimitsSummary, labelled};
 use crate::table::Withdrawn;
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use serde_json::json;
 use std::ffi::OsString;
 use std::time::Instant;
@@ -39,6 +41,9 @@ pub(super) struct RunArguments {
     /// Prints what stages note while they run, and the errors of every step and set, cross-validated and beside reference figures, too
     #[arg(long, conflicts_with = "json")]
     details: bool,
+    /// PageLanguage of the report, instead of the one that the pipeline names
+    #[arg(long, value_name = "LANGUAGE", value_parser = PossibleValuesParser::new(PageLanguage::ALL.map(PageLanguage::code)))]
+    language: Option<String>,
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
     #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "")]
     force: Option<Vec<String>>,
@@ -49,6 +54,7 @@ const EXAMPLES: &str = "Examples:
   calib run pipelines/case/pipeline.yaml --set case=recordings/robot-7
   calib run pipeline.yaml --set seed=7 --set split.n=5 --dry-run
   calib run pipeline.yaml --from stiffness --force
+  calib run pipeline.yaml --language de
   calib run pipeline.yaml --json --quiet > result.json";
 
 pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> u8 {
@@ -65,7 +71,7 @@ pub(super) const WRONG_SETUP: u8 = 10;
 fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     let begun = Instant::now();
     let shared = &arguments.shared;
-    let (plan, store) = (shared.plan()?, shared.store()?);
+    let (plan, store) = (shared.plan(arguments.language.as_deref())?, shared.store()?);
     // `--force` without a stage stands for all of them.
     let force = arguments.force.as_ref().map(|ids| ids.iter().filter(|id| !id.is_empty()).cloned().collect());
     let selection =

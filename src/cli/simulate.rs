@@ -4,7 +4,6 @@ mod conceal;
 mod prove;
 mod record;
 mod reveal;
-mod torques;
 
 use crate::error::Result;
 use clap::{Args, Subcommand};
@@ -23,7 +22,6 @@ enum SimulateVerb {
     Conceal(conceal::ConcealArguments),
     Reveal(reveal::RevealArguments),
     Prove(prove::ProveArguments),
-    Torques(torques::TorquesArguments),
 }
 
 pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> Result<()> {
@@ -32,6 +30,5 @@ pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> 
         SimulateVerb::Conceal(verb) => conceal::main(verb),
         SimulateVerb::Reveal(verb) => reveal::main(verb),
         SimulateVerb::Prove(verb) => prove::main(verb),
-        SimulateVerb::Torques(verb) => torques::main(verb),
     }
 }

@@ -1,12 +1,13 @@
 //! `calib verify-robot`: what compensation achieved, from points that were measured at corrected targets.
 
 use super::model_arguments::ModelArguments;
-use super::{emit_json, emit_lines};
+use super::{emit_json, emit_lines, write};
 use crate::compensate::{CorrectionOptions, Corrector, Gate, IdentifiedArm, load_matters};
 use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
 use crate::raw;
+use crate::report::{AchievedTables, achieved_page};
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::summary::labelled;
 use crate::targets::{Layout, Units, measured};
@@ -24,6 +25,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib verify-robot cell7/pipeline.yaml second.csv
+  calib verify-robot cell7/pipeline.yaml second.csv --html verified.html
   calib verify-robot latest second.csv --new-base --json")]
 pub(super) struct VerifyRobotArguments {
     #[command(flatten)]
@@ -37,6 +39,9 @@ pub(super) struct VerifyRobotArguments {
     /// kg at the tool, of targets without a column `payload_kg`
     #[arg(long, value_name = "KG")]
     payload: Option<f64>,
+    /// Writes the figures and their picture as one HTML page, too
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -81,6 +86,9 @@ pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) 
     };
     let mut corrector = Corrector::new(&arm, identified.coverage(), identified.uncertainty(&arm), options);
     let found = achieved(&arm, &nominal, &mut corrector, &rows, arguments.new_base)?;
+    if let Some(path) = &arguments.html {
+        write(path, &page(&identified.origin, &found, arguments.new_base)?)?;
+    }
     if arguments.json {
         return emit_json(&document(&identified.origin, &found));
     }
@@ -96,28 +104,52 @@ fn figures(lengths: &[f64]) -> [f64; 3] {
         .map(|length| length * 1e3)
 }
 
-fn told(origin: &str, found: &Achieved, new_base: bool) -> String {
-    let line = |label: &str, lengths: &[f64], what: &str| {
-        let [mean, p95, max] = figures(lengths);
-        labelled(label, &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}"))
-    };
-    let mut text = labelled("model", origin);
-    text.push_str(&line("before", &found.before, "of the uncorrected targets, by the model"));
-    if !found.predicted.is_empty() {
-        text.push_str(&line("predicted", &found.predicted, "within which 95 % of corrected targets were to be"));
-    }
+/// Before, predicted and achieved: name, mean, 95th percentile and largest, mm, and what they are of.
+fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String)> {
     let base = if new_base { ", the tracker's place found anew" } else { "" };
-    text.push_str(&line("achieved", &found.achieved, &format!("measured, {}{base}", counted(found.achieved.len(), "point"))));
-    if !found.predicted.is_empty() {
-        let beyond = found.achieved.iter().zip(&found.predicted).filter(|(achieved, predicted)| achieved > predicted).count();
-        text.push_str(&labelled("", &format!("{beyond} of {} points are farther off than predicted", found.achieved.len())));
+    let achieved = format!("measured, {}{base}", counted(found.achieved.len(), "point"));
+    let all = [
+        ("before", &found.before, "of the uncorrected targets, by the model".to_string()),
+        ("predicted", &found.predicted, "within which 95 % of corrected targets were to be".to_string()),
+        ("achieved", &found.achieved, achieved),
+    ];
+    let filled = all.into_iter().filter(|(_, lengths, _)| !lengths.is_empty());
+    filled.map(|(name, lengths, what)| (name, figures(lengths), what)).collect()
+}
+
+/// How many points are farther off than predicted; none where nothing was predicted.
+fn beyond(found: &Achieved) -> Option<String> {
+    let beyond = found.achieved.iter().zip(&found.predicted).filter(|(achieved, predicted)| achieved > predicted).count();
+    let line = format!("{beyond} of {} points are farther off than predicted", found.achieved.len());
+    (!found.predicted.is_empty()).then_some(line)
+}
+
+/// Targets without a correction; none where all have one.
+fn unreached(found: &Achieved) -> Option<String> {
+    let line = format!("{} cannot be reached by the model and had no correction", counted(found.unreached, "target"));
+    (found.unreached > 0).then_some(line)
+}
+
+fn page(origin: &str, found: &Achieved, new_base: bool) -> Result<String> {
+    let mm = |lengths: &[f64]| lengths.iter().map(|length| 1e3 * length).collect::<Vec<f64>>();
+    let poses = found.poses.iter().map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
+    achieved_page(&AchievedTables {
+        title: "Before, predicted and achieved",
+        model: origin,
+        rows: rows(found, new_base),
+        errors: [mm(&found.before), mm(&found.achieved)],
+        poses: poses.collect(),
+        remarks: beyond(found).into_iter().chain(unreached(found)).map(|line| format!("{line}.")).collect(),
+    })
+}
+
+fn told(origin: &str, found: &Achieved, new_base: bool) -> String {
+    let mut text = labelled("model", origin);
+    for (label, [mean, p95, max], what) in rows(found, new_base) {
+        text.push_str(&labelled(label, &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}")));
     }
-    if found.unreached > 0 {
-        text.push_str(&labelled(
-            "warning",
-            &format!("{} cannot be reached by the model and had no correction", counted(found.unreached, "target")),
-        ));
-    }
+    text.push_str(&beyond(found).map_or_else(String::new, |line| labelled("", &line)));
+    text.push_str(&unreached(found).map_or_else(String::new, |line| labelled("warning", &line)));
     for (k, pose) in (1..).zip(&found.poses) {
         let (accuracy, repeatability) = (1e3 * pose.accuracy, 1e3 * pose.repeatability);
         let text_of =

@@ -1,6 +1,6 @@
 //! The whole model as one JSON document: description, parameters with sigma, what rigid geometry leaves out.
 
-use super::{Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Error, Result};
 use serde_json::json;
@@ -14,6 +14,10 @@ impl Format for Json {
 
     fn help(&self) -> &'static str {
         "Everything: description, parameters with sigma, what is left out"
+    }
+
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::All
     }
 
     fn text(&self, export: &Export) -> Result<String> {
@@ -36,7 +40,7 @@ impl Format for Json {
             })
         });
         let base = identified.model.base();
-        let document = json!({
+        let mut document = json!({
             "calib_model": 1,
             "name": corrected.name,
             "origin": identified.origin,
@@ -50,6 +54,9 @@ impl Format for Json {
                 "effect": out.effect, "where": out.place.to_string(), "rms_mm": out.rms * 1e3, "max_mm": out.most * 1e3 })).collect::<Vec<_>>(),
             "learned_correction": identified.correction.is_some(),
         });
+        if let Some(torques) = &identified.torques {
+            document["torques"] = super::dynamics::document(export, torques);
+        }
         serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
     }
 }

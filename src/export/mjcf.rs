@@ -1,10 +1,10 @@
 //! MJCF, MuJoCo's own format: every body's frame parallel to the base at the zero pose and on its joint's axis, so that no angle is
 //! converted and a joint at 0 is the robot at 0. The measured point is a site.
 
-use super::model::{PLACEHOLDER, placeholder_inertia};
+use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, gear, positive};
 use super::xml::{self, Xml, empty, numbers, offset};
-use super::{Export, Format};
-use crate::description::{JointDescription, JointKind, RobotDescription};
+use super::{CarriedTorques, Export, Format};
+use crate::description::JointKind;
 use crate::error::{Result, one_line};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::io;
@@ -23,13 +23,17 @@ impl Format for Mjcf {
         "MuJoCo model: bodies and joints at the corrected axes, the tool as a site"
     }
 
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE])
+    }
+
     fn text(&self, export: &Export) -> Result<String> {
         let robot = &export.corrected;
-        let mut remarks = export.remarks();
+        let mut remarks = export.remarks_in(self.carries());
         if !robot.couplings.is_empty() {
             remarks.push("couplings of joints are not part of it: they stand in the original robot file".into());
         }
-        if robot.joints.iter().any(|joint| inertial(joint).is_none()) {
+        if (0..robot.joints.len()).any(|joint| export.body(joint).is_none()) {
             remarks.push(format!("bodies whose mass is not known have {} kg", LEAST[0].1));
         }
         let name = one_line(&robot.name);
@@ -39,9 +43,9 @@ impl Format for Mjcf {
                 empty(xml, "option", &[("gravity", &numbers(robot.gravity))])?;
                 xml.create_element("worldbody").write_inner_content(|xml| {
                     let base = xml.create_element("body").with_attribute(("name", "base_link"));
-                    base.write_inner_content(|xml| beyond(xml, robot, 0)).map(drop)
+                    base.write_inner_content(|xml| beyond(xml, export, 0)).map(drop)
                 })?;
-                Ok(())
+                drives(xml, export)
             })?;
             Ok(())
         })
@@ -49,7 +53,8 @@ impl Format for Mjcf {
 }
 
 /// What hangs on the body before joint `index` (from 0): the next body with all behind it, at last the tool.
-fn beyond(xml: &mut Xml, robot: &RobotDescription, index: usize) -> io::Result<()> {
+fn beyond(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
+    let robot = &export.corrected;
     let before = index.checked_sub(1).map_or([0.0; 3], |before| robot.joints[before].point);
     let Some(joint) = robot.joints.get(index) else {
         let r = &robot.tool_rotation;
@@ -61,24 +66,24 @@ fn beyond(xml: &mut Xml, robot: &RobotDescription, index: usize) -> io::Result<(
     let (name, place) = (format!("link_{}", index + 1), offset(joint.point, before));
     let body = xml.create_element("body").with_attributes([("name", name.as_str()), ("pos", place.as_str())]);
     body.write_inner_content(|xml| {
-        if let Some((mass, centre)) = inertial(joint) {
-            let inertia = numbers([placeholder_inertia(mass); 3]);
-            xml::comment(xml, PLACEHOLDER)?;
-            let parts = [("pos", offset(centre, joint.point)), ("mass", numbers([mass])), ("diaginertia", inertia)];
+        if let Some(body) = export.body(index) {
+            body.remark.map_or(Ok(()), |remark| xml::comment(xml, remark))?;
+            let [xx, xy, xz, yy, yz, zz] = body.inertia;
+            let inertia = match body.is_placeholder() {
+                true => ("diaginertia", numbers([xx, yy, zz])),
+                false => ("fullinertia", numbers([xx, yy, zz, xy, xz, yz])),
+            };
+            let parts = [("pos", numbers(body.centre)), ("mass", numbers([body.mass])), inertia];
             empty(xml, "inertial", &parts.each_ref().map(|(name, value)| (*name, value.as_str())))?;
         }
-        hinge(xml, joint)?;
-        beyond(xml, robot, index + 1)
+        hinge(xml, export, index)?;
+        beyond(xml, export, index + 1)
     })?;
     Ok(())
 }
 
-/// Mass and its centre, where both are known.
-fn inertial(joint: &JointDescription) -> Option<(f64, [f64; 3])> {
-    joint.mass.filter(|mass| *mass > 0.0).zip(joint.centre)
-}
-
-fn hinge(xml: &mut Xml, joint: &JointDescription) -> io::Result<()> {
+fn hinge(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
+    let joint = &export.corrected.joints[index];
     let (name, axis) = (one_line(&joint.name), numbers(joint.axis));
     let kind = if joint.kind == JointKind::Revolute { "hinge" } else { "slide" };
     let mut attributes = vec![("name", name.as_str()), ("type", kind), ("pos", "0 0 0"), ("axis", &axis)];
@@ -87,5 +92,29 @@ fn hinge(xml: &mut Xml, joint: &JointDescription) -> io::Result<()> {
         Some(range) => attributes.extend([("limited", "true"), ("range", range)]),
         None => attributes.push(("limited", "false")),
     }
+    let torques = export.identified.torques.as_ref();
+    let dynamics = [("damping", DAMPING), ("frictionloss", FRICTION), ("armature", ARMATURE)];
+    let dynamics = dynamics.map(|(name, effect)| (name, torques.and_then(|torques| positive(torques, effect, index))));
+    let dynamics: Vec<(&str, String)> =
+        dynamics.into_iter().filter_map(|(name, value)| Some((name, numbers([value?])))).collect();
+    attributes.extend(dynamics.iter().map(|(name, value)| (*name, value.as_str())));
     empty(xml, "joint", &attributes)
+}
+
+/// A motor for each joint that takes amperes, where torques were identified and the drives are declared.
+fn drives(xml: &mut Xml, export: &Export) -> io::Result<()> {
+    let Some(torques) = &export.identified.torques else { return Ok(()) };
+    let gears: Vec<(String, String)> = (export.corrected.joints.iter().enumerate())
+        .filter_map(|(index, joint)| Some((one_line(&joint.name), numbers([gear(torques, index)?]))))
+        .collect();
+    if gears.is_empty() {
+        return Ok(());
+    }
+    xml.create_element("actuator").write_inner_content(|xml| {
+        xml::comment(xml, "controls are motor currents, A")?;
+        gears.iter().try_for_each(|(joint, gear)| {
+            empty(xml, "motor", &[("name", &format!("motor_{joint}")), ("joint", joint), ("gear", gear)])
+        })
+    })?;
+    Ok(())
 }

@@ -45,6 +45,13 @@ impl Export {
     /// What the reader of an export must know, a sentence a line.
     pub fn remarks(&self) -> Vec<String> {
         let which = if self.recorded { "recorded poses" } else { "poses spread over the joint limits" };
+        if self.identified.is_of_torques_alone() {
+            let name = one_line(&self.corrected.name);
+            let mut lines = vec![format!("geometry of {name} as declared, torques of {}", self.identified.origin)];
+            lines.extend(self.identified.torques.iter().flat_map(|torques| torques.warnings.iter().map(|line| one_line(line))));
+            lines.extend(self.insisted());
+            return lines;
+        }
         let mut lines = vec![
             format!("corrected geometry of {}, {}", one_line(&self.corrected.name), self.identified.origin),
             format!(
@@ -68,11 +75,16 @@ impl Export {
         for LeftOut { effect, place, rms, most } in &self.left_out {
             lines.push(format!("not carried: {effect} at {place}, {:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
         }
-        lines.extend(self.identified.refusals.iter().map(|reason| format!("written because of --force: {}", one_line(reason))));
+        lines.extend(self.insisted());
         if self.identified.correction.is_some() {
             lines.push("not carried: the learned correction".into());
         }
         lines
+    }
+
+    /// What was refused and is written all the same.
+    fn insisted(&self) -> Vec<String> {
+        self.identified.refusals.iter().map(|reason| format!("written because of --force: {}", one_line(reason))).collect()
     }
 }
 

@@ -1,9 +1,9 @@
 //! URDF: every joint frame parallel to the base at the zero pose and on its axis, so that no angle is converted.
 
-use super::model::{PLACEHOLDER, placeholder_inertia};
+use super::friction::{DAMPING, FRICTION, positive};
 use super::xml::{self, Xml, empty, numbers, offset};
-use super::{Export, Format};
-use crate::description::{JointDescription, JointKind, RobotDescription};
+use super::{CarriedTorques, Export, Format};
+use crate::description::JointKind;
 use crate::error::{Result, one_line};
 use nalgebra::{Matrix3, Rotation3};
 use std::io;
@@ -19,25 +19,29 @@ impl Format for Urdf {
         "Unified robot description: joints at the corrected axes"
     }
 
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::Causes(&[DAMPING, FRICTION])
+    }
+
     fn text(&self, export: &Export) -> Result<String> {
-        xml::document(&export.remarks(), |xml| {
+        let remarks = export.remarks_in(self.carries());
+        xml::document(&remarks, |xml| {
             let name = one_line(&export.corrected.name);
-            xml.create_element("robot")
-                .with_attribute(("name", name.as_str()))
-                .write_inner_content(|xml| robot(xml, &export.corrected))?;
+            xml.create_element("robot").with_attribute(("name", name.as_str())).write_inner_content(|xml| robot(xml, export))?;
             Ok(())
         })
     }
 }
 
-fn robot(xml: &mut Xml, robot: &RobotDescription) -> io::Result<()> {
+fn robot(xml: &mut Xml, export: &Export) -> io::Result<()> {
+    let robot = &export.corrected;
     empty(xml, "link", &[("name", "base_link")])?;
     let mut before = [0.0; 3];
     let mut parent = "base_link".to_string();
     for (index, one) in robot.joints.iter().enumerate() {
         let child = format!("link_{}", index + 1);
-        link(xml, one, &child)?;
-        joint(xml, one, before, [&parent, &child])?;
+        link(xml, export, index, &child)?;
+        joint(xml, export, index, before, [&parent, &child])?;
         (before, parent) = (one.point, child);
     }
     let r = &robot.tool_rotation;
@@ -53,18 +57,18 @@ fn robot(xml: &mut Xml, robot: &RobotDescription) -> io::Result<()> {
 }
 
 /// A link with its mass where it is known.
-fn link(xml: &mut Xml, joint: &JointDescription, name: &str) -> io::Result<()> {
-    let (Some(mass), Some(centre)) = (joint.mass.filter(|mass| *mass > 0.0), joint.centre) else {
+fn link(xml: &mut Xml, export: &Export, index: usize, name: &str) -> io::Result<()> {
+    let Some(body) = export.body(index) else {
         return empty(xml, "link", &[("name", name)]);
     };
-    let inertia = numbers([placeholder_inertia(mass)]);
-    let inertia = inertia.as_str();
     xml.create_element("link").with_attribute(("name", name)).write_inner_content(|xml| {
-        xml::comment(xml, PLACEHOLDER)?;
+        body.remark.map_or(Ok(()), |remark| xml::comment(xml, remark))?;
         xml.create_element("inertial").write_inner_content(|xml| {
-            empty(xml, "origin", &[("xyz", &offset(centre, joint.point))])?;
-            empty(xml, "mass", &[("value", &numbers([mass]))])?;
-            let moments = [("ixx", inertia), ("ixy", "0"), ("ixz", "0"), ("iyy", inertia), ("iyz", "0"), ("izz", inertia)];
+            empty(xml, "origin", &[("xyz", &numbers(body.centre))])?;
+            empty(xml, "mass", &[("value", &numbers([body.mass]))])?;
+            let moments = body.inertia.map(|moment| if moment == 0.0 { "0".to_string() } else { numbers([moment]) });
+            let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+            let moments: Vec<(&str, &str)> = names.into_iter().zip(moments.iter().map(String::as_str)).collect();
             empty(xml, "inertia", &moments)
         })?;
         Ok(())
@@ -73,7 +77,8 @@ fn link(xml: &mut Xml, joint: &JointDescription, name: &str) -> io::Result<()> {
 }
 
 /// A joint whose frame lies on its axis, seen from that of the joint before, at `before`.
-fn joint(xml: &mut Xml, joint: &JointDescription, before: [f64; 3], [parent, child]: [&str; 2]) -> io::Result<()> {
+fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent, child]: [&str; 2]) -> io::Result<()> {
+    let joint = &export.corrected.joints[index];
     let kind = match (joint.kind, joint.limits) {
         (JointKind::Prismatic, _) => "prismatic",
         (JointKind::Revolute, Some(_)) => "revolute",
@@ -95,9 +100,17 @@ fn joint(xml: &mut Xml, joint: &JointDescription, before: [f64; 3], [parent, chi
                 empty(xml, "limit", &[("lower", lower), ("upper", upper), ("effort", "0"), ("velocity", "0")])
             }
             None => Ok(()),
-        }
+        }?;
+        dynamics(xml, export, index)
     })?;
     Ok(())
+}
+
+/// Friction, where torques show it.
+fn dynamics(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
+    let Some(torques) = &export.identified.torques else { return Ok(()) };
+    let number = |effect| numbers([positive(torques, effect, index).unwrap_or(0.0)]);
+    empty(xml, "dynamics", &[("damping", &number(DAMPING)), ("friction", &number(FRICTION))])
 }
 
 /// Which links a joint connects.

@@ -5,6 +5,7 @@ mod convention;
 mod robot_file;
 mod scatter;
 mod standing;
+mod torques;
 mod written;
 
 pub use achieved::{Achieved, RepeatedPose, achieved};
@@ -12,6 +13,7 @@ pub use convention::{convention_of, counted_otherwise};
 pub use robot_file::robot_file;
 use standing::unexplained_of;
 pub use standing::{standing_of, wrong_setup_of};
+pub use torques::IdentifiedTorques;
 
 use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
 use crate::description::RobotDescription;
@@ -26,7 +28,8 @@ use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
-    Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file,
+    Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing, Table, TorqueParameters,
+    from_file,
 };
 use std::path::{Path, PathBuf};
 use written::written;
@@ -42,6 +45,8 @@ pub struct IdentifiedModel {
     pub parameters: Parameters,
     /// Nominal arm, effects and their values.
     pub model: Model,
+    /// What was identified of the torques, if anything.
+    pub torques: Option<IdentifiedTorques>,
     /// What was learned on top, if anything.
     pub correction: Option<Correction>,
     /// Of the estimated parameters, where it is known.
@@ -79,10 +84,13 @@ pub struct Files {
 /// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
 pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
     let writes = |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
-    let steps: Vec<usize> =
-        (0..plan.stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
+    let kinds = [Parameters::KIND, Network::KIND, TorqueParameters::KIND];
+    let steps: Vec<usize> = (0..plan.stages.len()).filter(|at| kinds.iter().any(|kind| writes(*at, kind))).collect();
     if steps.is_empty() {
-        return Err(Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"));
+        return Err(Error::spec(
+            plan.file.display().to_string(),
+            "identifies nothing; put a stage `identify` after the split, or `diagnose_torques` after `ingest_torques`",
+        ));
     }
     Ok(steps)
 }
@@ -114,11 +122,18 @@ impl IdentifiedModel {
             return Err(Error::data(run, message));
         }
         let stands = if step.is_none() { standing_of(manifest, store)? } else { None };
-        let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let load = |table: &TableRef| load(store, table, manifest);
         let last = |kind: &str| manifest.stages.iter().flat_map(|stage| &stage.outputs).rfind(|output| output.kind == kind);
         let robot = last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
         let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
+        let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
+        let sources: Vec<PathBuf> = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
+        let alone = step.is_some() || last(Parameters::KIND).is_none();
+        let torques = match IdentifiedTorques::of_run(manifest, step, &robot, load)? {
+            Some(torques) if alone => return Ok(Self { sources, ..Self::of_torques(robot, torques)? }),
+            other => other,
+        };
+        let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let parameters = Parameters::from_frame(&load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.
         let withdrawn = |id: &str| stands.iter().flat_map(|stands| &stands.withdrawn).any(|gone| gone.step == id);
@@ -138,8 +153,6 @@ impl IdentifiedModel {
         };
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
-        let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
-        let sources = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
         let unexplained = unexplained_of(manifest, store)?;
         let warnings = stands.iter().flat_map(Standing::warnings).chain(unexplained.clone()).collect();
         let told = manifest.stages.iter().flat_map(|stage| &stage.warnings).find(|line| line.starts_with(WRONG_SETUP)).cloned();
@@ -152,15 +165,30 @@ impl IdentifiedModel {
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
         let convention = Some(convention);
-        let known = Self { correction, covariance, scatter, data, convention, ..own };
+        let known = Self { torques, correction, covariance, scatter, data, convention, ..own };
         Ok(Self { unexplained, warnings, stage_warnings, refusals, sources, ..known })
+    }
+
+    /// Torques alone: positions are those of the robot file.
+    fn of_torques(robot: RobotDescription, torques: IdentifiedTorques) -> Result<Self> {
+        let (warnings, refusals) = (torques.warnings.clone(), torques.refusals.clone());
+        let nominal = Self::of(robot, Parameters::default(), torques.origin.clone())?;
+        Ok(Self { torques: Some(torques), warnings, refusals, ..nominal })
+    }
+
+    /// Whether torques were identified and positions were not.
+    pub fn is_of_torques_alone(&self) -> bool {
+        self.torques.is_some() && self.parameters.0.is_empty()
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
     pub fn of_files(files: &Files) -> Result<Self> {
         let mut warnings = Vec::new();
-        let loose = from_file::<Parameters>(&files.parameters)?;
-        let parameters = files.vouched(&files.parameters, loose, &mut warnings)?;
+        let torques = from_file::<TorqueParameters>(&files.parameters).ok();
+        let parameters = match &torques {
+            Some(_) => Parameters::default(),
+            None => files.vouched(&files.parameters, from_file::<Parameters>(&files.parameters)?, &mut warnings)?,
+        };
         let robot = if ending(&files.robot) == "parquet" {
             let loose = from_file::<Robot>(&files.robot)?;
             files.vouched(&files.robot, loose, &mut warnings)?.to_description()?
@@ -169,6 +197,11 @@ impl IdentifiedModel {
         };
         let origin = format!("table {}", files.parameters.display());
         let sources = vec![files.parameters.clone(), files.robot.clone()];
+        if let Some(loose) = torques {
+            let table = files.vouched(&files.parameters, loose, &mut warnings)?;
+            let own = Self::of_torques(robot.clone(), IdentifiedTorques::of(&robot, table, origin)?)?;
+            return Ok(Self { warnings: [warnings, own.warnings].concat(), sources, ..own });
+        }
         Ok(Self { warnings, sources, ..Self::of(robot, parameters, origin)? })
     }
 
@@ -184,6 +217,7 @@ impl IdentifiedModel {
             robot,
             parameters,
             model,
+            torques: None,
             correction: None,
             covariance: None,
             scatter,

@@ -17,6 +17,8 @@ pub use marks::{MarkedLines, marked};
 pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result, counted};
+use crate::raw;
+use crate::robot::import::{RobotFileText, UrdfOutline, urdf_outline};
 use columns::ExaminedFile;
 use pipeline::missing;
 use quantities::examine;
@@ -55,23 +57,42 @@ impl StarterFiles {
     }
 }
 
+/// Where the chain of a URDF begins, and which of its joints slide.
+fn outline(path: &Path, tip: &str) -> Result<UrdfOutline> {
+    let label = path.display().to_string();
+    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    urdf_outline(RobotFileText { label: &label, text: &text }, tip)
+}
+
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let tables = request.data.iter().map(|path| examine(path, places)).collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
-    if request.data.len() > 2 && !found.iter().all(together::is_whole) {
+    let more = together::other_reflectors(&mut found);
+    if found.len() > 2 && !found.iter().all(together::is_whole) {
         let message = format!(
-            "{} files; allowed: one recording, the controller's and the tracker's, or recordings that have joints and points each. Join the files \
-             of several reflectors before, or name them under `files` of `ingest` and say there how their rows belong together",
+            "{} files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each \
+             of several reflectors, or recordings that have joints and points each",
             request.data.len()
         );
         return Err(Error::spec("--data", message));
     }
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
-    let robot = match request.urdf {
-        Some(_) => robots::of_urdf(request.tip),
+    let urdf = request.urdf.map(|path| outline(path, request.tip)).transpose()?;
+    let robot = match &urdf {
+        Some(UrdfOutline { base, sliding }) => {
+            if let Some(n) = joints.filter(|n| *n != sliding.len()) {
+                let message = format!(
+                    "the chain from `{base}` to `{}` has {}, the recording {n}; name the last link that moves, or one fixed to it",
+                    request.tip,
+                    counted(sliding.len(), "joint")
+                );
+                return Err(Error::spec("--tip", message));
+            }
+            robots::of_urdf(base, request.tip)
+        }
         None => {
             let own = request.robot.joints()?;
             if let Some(n) = joints.filter(|n| *n != own) {
@@ -81,13 +102,15 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
             request.robot.text()
         }
     };
-    let joined = together::join(&mut found);
-    let pipeline = pipeline::text(request, &found, &joined)?;
+    let mut joined = together::join(&mut found);
+    joined.lines.extend(pipeline::later(request.folder, &found, &more));
+    let sliding = urdf.map(|outline| outline.sliding).unwrap_or_default();
+    let pipeline = pipeline::text(request, &found, (&joined, &sliding))?;
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
     Ok(StarterFiles {
         robot,
         pipeline,
-        accounts: found.iter().map(|file| (file.path.clone(), file.account())).collect(),
+        accounts: found.iter().chain(more.iter().map(|(_, file)| file)).map(|file| (file.path.clone(), file.account())).collect(),
         missing: if found.is_empty() {
             Vec::new()
         } else {

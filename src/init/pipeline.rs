@@ -16,7 +16,8 @@ fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joined) -> Result<String> {
+/// `sliding`: which joints of a URDF are prismatic.
+pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, sliding): (&Joined, &[bool])) -> Result<String> {
     // A folder that is still to be made has its name already.
     let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
     let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -31,7 +32,7 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
         "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n",
     );
     out.push_str("  - uses: ingest\n    with:\n      files:\n");
-    let counting = if request.urdf.is_none() { request.robot.counting()? } else { None };
+    let counting = if request.urdf.is_none() { request.robot.counting()? } else { linear(found, sliding) };
     if found.is_empty() {
         out.push_str(&EMPTY.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
     }
@@ -60,6 +61,27 @@ fn counted(line: &str, counting: Option<&str>) -> String {
     // The map ends at the last brace before a comment: names of columns may hold both.
     let end = line.find("}   #").unwrap_or(line.len() - 1);
     format!("{}, {counting}{}", &line[..end], &line[end..])
+}
+
+/// The unit of joints that slide, as a setting of `q`: by the first one's name, else by its size.
+fn linear(found: &[ExaminedFile], sliding: &[bool]) -> Option<String> {
+    let joint = sliding.iter().position(|sliding| *sliding)?;
+    let unit = found.iter().find_map(|file| {
+        let column = *file.get("q")?.choices.first()?.columns.get(joint)?;
+        Some(file.length_unit(&[column]).0)
+    });
+    Some(format!("linear_unit: {}", unit.unwrap_or("mm")))
+}
+
+/// Files of further reflectors, each beside the file of joints.
+pub(super) fn later(folder: &Path, found: &[ExaminedFile], more: &[(String, ExaminedFile)]) -> Vec<String> {
+    let [joints, _] = found else { return Vec::new() };
+    let line = |(target, file): &(String, ExaminedFile)| {
+        let files = [joints, file].map(|file| from_folder(folder, &file.path)).join(", ");
+        format!("        - {{files: [{files}], target: {}}}", quoted(target))
+    };
+    let head = "      later:                  # CHECK: the other reflectors, measured in the same poses".to_string();
+    (!more.is_empty()).then_some(head).into_iter().chain(more.iter().map(line)).collect()
 }
 
 /// A line to fill in: nobody but the person knows what measured.
@@ -238,5 +260,6 @@ const STAGES: &str = "
     with:
       # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is met
       # identity: {operator: REPLACE, robot serial: REPLACE, tracker: REPLACE, date: REPLACE}     # stands on the report as given
+      # language: de                             # of the report: en or de
       title: null                              # the heading; null: the robot's name
 ";

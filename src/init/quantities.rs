@@ -24,6 +24,7 @@ pub(super) fn examine(path: &Path, places: usize) -> Result<Vec<ExaminedFile>> {
         } else if found.sheet.trouble.is_none() {
             found.joints();
             found.point();
+            found.quaternion();
             found.per_joint();
             found.scalars();
             found.time();
@@ -78,8 +79,9 @@ impl ExaminedFile {
         let mut rows = joints(&self.said, angle);
         rows.retain(|columns| columns.iter().all(|column| self.sheet.is_numeric(*column)));
         let Some(best) = rows.first() else { return };
-        let degrees = best.iter().any(|column| self.sheet.largest(*column) > MOST_RADIANS);
-        let named = self.said[best[0]].unit_of(&["deg", "rad"]);
+        let turning = |column: &&usize| self.said[**column].unit_of(&LENGTHS).is_none();
+        let degrees = best.iter().filter(turning).any(|column| self.sheet.largest(*column) > MOST_RADIANS);
+        let named = best.iter().find_map(|column| self.said[*column].unit_of(&["deg", "rad"]));
         let (unit, why) = match named {
             Some(unit) => (unit, None),
             None if degrees => ("deg", Some("values beyond 6.5 cannot be radians".to_string())),
@@ -145,6 +147,21 @@ impl ExaminedFile {
         self.mappings.push(mapping);
     }
 
+    /// A quaternion beside the point, as lines to take in: with a standard deviation, which only the instrument's owner knows, rows are full
+    /// poses.
+    fn quaternion(&mut self) {
+        let column = |name: &str| (0..self.said.len()).find(|k| self.said[*k].stem() == name && self.sheet.holds_numbers(*k));
+        let all = |prefix: &&str| ["w", "x", "y", "z"].map(|axis| column(&format!("{prefix}{axis}")));
+        let found = words::QUATERNIONS.iter().map(all).find_map(|columns| columns.into_iter().collect::<Option<Vec<usize>>>());
+        let unit = |columns: &Vec<usize>| columns.iter().all(|column| self.sheet.largest(*column) <= 1.0 + 1e-3);
+        let Some(columns) = found.filter(unit).filter(|_| self.get("x").is_some()) else { return };
+        let names = columns.iter().map(|column| self.reference(*column)).collect::<Vec<_>>().join(", ");
+        self.remarks.push(format!(
+            "orientation: {{quaternion: [{names}]}}   # CHECK: full poses, with the line below and your instrument's figure"
+        ));
+        self.remarks.push("sigma_orientation: {value: 30, unit: arcsec}".into());
+    }
+
     /// Several targets side by side, or one of them alone.
     fn targets(&self, found: &Points) -> Option<Mapping> {
         let unit = self.length_unit(&found.targets.first()?.1).0;
@@ -184,7 +201,7 @@ impl ExaminedFile {
     }
 
     /// The unit of coordinates, and whether their size alone says so.
-    fn length_unit(&self, columns: &[usize; 3]) -> (&'static str, bool) {
+    pub(super) fn length_unit(&self, columns: &[usize]) -> (&'static str, bool) {
         if let Some(unit) = columns.iter().find_map(|column| self.said[*column].unit_of(&LENGTHS)) {
             return (unit, false);
         }

@@ -89,9 +89,10 @@ impl RobotFileKind {
 }
 
 /// The robot file beside a URDF.
-pub(super) fn of_urdf(tip: &str) -> String {
+pub(super) fn of_urdf(base: &str, tip: &str) -> String {
     format!(
-        "{HEAD}  urdf: {{base: base_link, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{URDF_LINKS}{PAYLOAD}",
+        "{HEAD}  urdf: {{base: {}, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{URDF_LINKS}{PAYLOAD}",
+        quoted(base),
         quoted(tip)
     )
 }

@@ -5,6 +5,7 @@ use super::sheet::number;
 use super::words;
 use crate::stage::ingest::last_number;
 use crate::statistics;
+use crate::yaml::quoted;
 use std::collections::BTreeSet;
 
 /// Names that fewer rows share than this are not the same names.
@@ -81,6 +82,50 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
 /// Whether a file is a recording of its own: it has joints and points.
 pub(super) fn is_whole(file: &ExaminedFile) -> bool {
     file.get("q").is_some() && file.get("x").is_some()
+}
+
+/// Of a file of joints and lists of points in one layout, a reflector each, all lists but the first, with the reflectors' names; the first
+/// file has the joints then, the second the points of the first reflector. Nothing of other files.
+pub(super) fn other_reflectors(found: &mut Vec<ExaminedFile>) -> Vec<(String, ExaminedFile)> {
+    let is_list = |file: &ExaminedFile| file.get("x").is_some() && file.get("q").is_none() && file.get("target").is_none();
+    let Some(joints) = found.iter().position(|file| file.get("q").is_some() && file.get("x").is_none()) else {
+        return Vec::new();
+    };
+    if found.len() < 3 || !found.iter().enumerate().all(|(k, file)| k == joints || is_list(file)) {
+        return Vec::new();
+    }
+    let lead = found.remove(joints);
+    let layout = |file: &ExaminedFile| {
+        let sheet = &file.sheet;
+        (sheet.names.clone(), sheet.delimiter, sheet.comma, sheet.skip, sheet.unit_row, sheet.comment, sheet.header)
+    };
+    if !found.iter().all(|file| layout(file) == layout(&found[0])) {
+        found.insert(joints, lead);
+        return Vec::new();
+    }
+    let stems: Vec<String> = found
+        .iter()
+        .map(|file| file.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default())
+        .collect();
+    let mut named: Vec<(String, ExaminedFile)> = reflectors(&stems).into_iter().zip(found.drain(..)).collect();
+    let (name, mut first) = named.remove(0);
+    first.state("target", &quoted(&name), "which reflector it was, by the file's name");
+    found.extend([lead, first]);
+    named
+}
+
+/// Names of reflectors by their files: what is left of the names without what all of them have in front and behind.
+fn reflectors(stems: &[String]) -> Vec<String> {
+    let all: Vec<Vec<char>> = stems.iter().map(|stem| stem.chars().collect()).collect();
+    let shortest = all.iter().map(Vec::len).min().unwrap_or_default();
+    let alike = |same: &dyn Fn(&[char], usize) -> char| {
+        (0..shortest).take_while(|k| all.iter().all(|stem| same(stem, *k) == same(&all[0], *k))).count()
+    };
+    let front = alike(&|stem, k| stem[k]);
+    let back = alike(&|stem, k| stem[stem.len() - 1 - k]).min(shortest - front);
+    let own = all.iter().map(|stem| stem[front..stem.len() - back].iter().collect::<String>());
+    let own: Vec<String> = own.map(|name| name.trim_matches(['_', '-', ' ', '.']).to_string()).collect();
+    if own.iter().any(String::is_empty) { stems.to_vec() } else { own }
 }
 
 /// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so

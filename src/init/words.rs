@@ -52,6 +52,9 @@ pub(super) const NO_JOINTS: [&str; 22] = [
     "speed",
 ];
 
+/// What the parts of a quaternion are called before `w`, `x`, `y`, `z`.
+pub(super) const QUATERNIONS: [&str; 6] = ["q", "q_", "quat_", "quaternion_", "rot_", "orientation_"];
+
 /// What stands beside the name of an axis where several points are in one table.
 pub(super) const MEASURED: [&str; 19] = [
     "ist",

@@ -1,8 +1,8 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
+use super::concealed_set::ConcealedSet;
 use crate::error::{Error, Fault, Result};
 use crate::raw;
-use crate::twin::conceal::design::Design;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -33,12 +33,12 @@ pub struct Seal {
 }
 
 impl Seal {
-    pub(super) fn new(design: &Design) -> Seal {
+    pub(super) fn new(design: &ConcealedSet) -> Seal {
         Seal { calib_seal: FORMAT, hash: HASH.into(), design: digest(format!("{design:?}").as_bytes()), files: BTreeMap::new() }
     }
 
     /// Whether the set was drawn from this design.
-    pub fn is_of(&self, design: &Design) -> bool {
+    pub fn is_of(&self, design: &ConcealedSet) -> bool {
         self.design == Seal::new(design).design
     }
 

@@ -1,41 +1,57 @@
 //! A set of concealed recordings as a folder: what a user has, and the truth of each apart.
 
+use super::concealed_set::ConcealedSet;
 use super::seal::{RECORDINGS, SEALED, Seal};
 use crate::error::{Error, Result};
 use crate::estimate::threads::in_order;
 use crate::twin::conceal::case::Case;
 use crate::twin::conceal::design::{Content, Design};
+use crate::twin::torque::{TorqueCase, TorqueDesign};
 use std::path::Path;
 
-/// Writes the recordings, their truths and the seal; gives the number of points. No byte depends on the number of threads.
-pub fn conceal(folder: &Path, design: &Design, threads: usize) -> Result<usize> {
-    let contents = design.contents();
-    let made = in_order(threads, contents.len(), |number| written(design, number, contents[number]));
-    let mut seal = Seal::new(design);
-    let mut points = 0;
+/// Writes the recordings, their truths and the seal; gives the number of rows. No byte depends on the number of threads.
+pub fn conceal(folder: &Path, set: &ConcealedSet, threads: usize) -> Result<usize> {
+    let contents = match set {
+        ConcealedSet::Positions(design) => design.contents(),
+        ConcealedSet::Torques(_) => Vec::new(),
+    };
+    let made = in_order(threads, set.cases(), |number| match set {
+        ConcealedSet::Positions(design) => points(design, number, contents[number]),
+        ConcealedSet::Torques(design) => Ok(torques(design, number)),
+    });
+    let mut seal = Seal::new(set);
+    let mut rows = 0;
     for case in made {
         let case = case.map_err(|message| Error::spec("conceal", message))?;
         for (name, text) in &case.recording {
             seal.write(folder, format!("{RECORDINGS}/{}/{name}", case.name), text)?;
         }
         seal.write(folder, format!("{SEALED}/{}.json", case.name), &case.sealed)?;
-        points += case.points;
+        rows += case.rows;
     }
     seal.close(folder)?;
-    Ok(points)
+    Ok(rows)
 }
 
 /// A case as it goes to the disk.
 struct Written {
     name: String,
-    points: usize,
-    recording: [(&'static str, String); 3],
+    rows: usize,
+    recording: Vec<(&'static str, String)>,
     sealed: String,
 }
 
-fn written(design: &Design, number: usize, content: Content) -> Result<Written, String> {
+fn points(design: &Design, number: usize, content: Content) -> Result<Written, String> {
     let case = Case::make(design, number, content)?;
-    Ok(Written { recording: case.recording()?, sealed: case.sealed(), points: case.shots.len(), name: case.name })
+    Ok(Written { recording: case.recording()?.into(), sealed: case.sealed(), rows: case.shots.len(), name: case.name })
+}
+
+fn torques(design: &TorqueDesign, number: usize) -> Written {
+    let case = TorqueCase::draw(design, number);
+    let recording: Vec<(&'static str, String)> = case.recording().into();
+    // The header is a line of its own.
+    let rows = recording.iter().map(|(name, text)| if name.ends_with(".csv") { text.lines().count() - 1 } else { 0 }).sum();
+    Written { recording, sealed: case.sealed(), rows, name: case.name }
 }
 
 /// Nothing is overwritten: the folder is new or empty.

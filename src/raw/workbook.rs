@@ -89,7 +89,7 @@ impl Workbook {
             if cell.get_position().0 != row {
                 (row, numbers) = (cell.get_position().0, 0);
             }
-            numbers += usize::from(matches!(cell.get_value(), DataRef::Float(_) | DataRef::Int(_)));
+            numbers += usize::from(is_number(cell.get_value()));
             Ok(numbers < NARROWEST)
         });
         found.map(|()| numbers >= NARROWEST)
@@ -154,6 +154,17 @@ impl Workbook {
         }
         lines.push('\n');
         Ok(lines)
+    }
+}
+
+/// Whether a cell holds a number, or a text that is one, with a decimal point or comma.
+fn is_number(value: &DataRef) -> bool {
+    let is_text_of = |text: &str| text.trim().replacen(',', ".", 1).parse().is_ok_and(f64::is_finite);
+    match value {
+        DataRef::Float(_) | DataRef::Int(_) => true,
+        DataRef::String(text) => is_text_of(text),
+        DataRef::SharedString(text) => is_text_of(text),
+        _ => false,
     }
 }
 

@@ -93,7 +93,7 @@ fn picture(all: &[FixtureFigures]) -> String {
     scale.grid_x(&mut svg, area, 7);
     for (k, own) in all.iter().enumerate() {
         let top = area.top + ROW * k as f64;
-        svg.text("tick end", [area.left - 6.0, top + 0.7 * ROW], &own.name);
+        svg.name("tick end", [area.left - 6.0, top + 0.7 * ROW], &own.name);
         for (bar, (mean, colour)) in [(own.before[0], "s0"), (own.after[0], "s-last")].into_iter().enumerate() {
             let width = (scale.at(mean.max(0.5 * lower.min(upper))) - area.left).max(0.8);
             svg.rect(&format!("fill {colour}"), [area.left, top + 2.0 + 8.0 * bar as f64], [width, 7.0]);

@@ -55,7 +55,7 @@ pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
         baseline(&mut svg, Area { bottom: foot, ..area });
         let mean = scale.at(errors.mean_mm);
         svg.line("mean", [mean, foot - ROW + 22.0], [mean, foot]);
-        svg.text("name", [area.left, foot - ROW + 18.0], &errors.step);
+        svg.name("name", [area.left, foot - ROW + 18.0], &errors.step);
         // Clear of the name on the left, and of the edge on the right.
         let clear = area.left + GLYPH * errors.step.chars().count() as f64 + 8.0;
         let (class, x) =

@@ -154,7 +154,7 @@ impl ErrorsSection {
         let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
         Ok(Self {
             verdict: match wrong_setup(tables) {
-                Some(wrong) => nothing_known(format!("Nothing is calibrated: {wrong}.")),
+                Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
                 None => verdict(rows, &last, &tables.withdrawn),
             },
             held_out: held_out.chain(used).collect(),

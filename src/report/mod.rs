@@ -2,6 +2,7 @@
 //!
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
+mod achieved;
 mod axis;
 mod certificate;
 mod closure;
@@ -14,6 +15,7 @@ mod findings;
 mod fits;
 pub mod fleet;
 mod json;
+mod language;
 mod limits;
 mod number;
 mod page;
@@ -22,6 +24,8 @@ mod svg;
 mod torques;
 mod workspace;
 
+pub use achieved::{AchievedTables, achieved_page};
+pub use language::{PageLanguage, Translation};
 pub use limits::AcceptanceLimits;
 pub use torques::{TorqueTables, torque_page};
 
@@ -89,6 +93,8 @@ pub struct ReportOptions<'a> {
     pub set: Option<&'a str>,
     /// What the user calls good enough.
     pub limits: AcceptanceLimits,
+    /// Of the page; its JSON is English.
+    pub language: PageLanguage,
     /// Who, with what, where and when: shown as it was given.
     pub identity: &'a BTreeMap<String, String>,
     /// Content hashes of the tables that the report rests on.
@@ -154,5 +160,5 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         robot,
     };
     let html = page::render("report.html", include_str!("report.html"), &page)?;
-    Ok(Pages { html, json })
+    Ok(Pages { html: options.language.page(html).html, json })
 }

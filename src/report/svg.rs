@@ -47,8 +47,15 @@ impl Svg {
     }
     /// Text at its baseline; the class says how it is anchored.
     pub fn text(&mut self, class: &str, at: SvgPoint, text: &str) {
-        let _ =
-            writeln!(self.body, "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>", tenth(at[0]), tenth(at[1]), escape(text));
+        self.words(class, "", at, text);
+    }
+    /// A name that somebody gave, which no language changes.
+    pub fn name(&mut self, class: &str, at: SvgPoint, text: &str) {
+        self.words(class, " translate=\"no\"", at, text);
+    }
+    fn words(&mut self, class: &str, more: &str, at: SvgPoint, text: &str) {
+        let [x, y] = at.map(tenth);
+        let _ = writeln!(self.body, "<text class=\"{class}\"{more} x=\"{x}\" y=\"{y}\">{}</text>", escape(text));
     }
     /// The `svg` element; `title` is what a screen reader says.
     pub fn finish(self, title: &str) -> String {

@@ -6,8 +6,9 @@ use super::svg::Svg;
 use super::{data, page};
 use crate::error::{Error, Result};
 use crate::table::{
-    ContactRow, Contacts, FrictionCurveRow, FrictionCurves, InertialRow, Inertials, JointTorqueRow, JointTorques, Robot,
-    TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, TorqueVerdictRow,
+    BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves, InertialRow, Inertials,
+    JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
+    TorqueVerdict, TorqueVerdictRow,
 };
 use serde::Serialize;
 
@@ -33,6 +34,8 @@ pub struct TorqueTables {
     pub inertials: Inertials,
     /// Pushes on the arm.
     pub contacts: Contacts,
+    /// Whether the inertials are those of bodies.
+    pub consistency: BodyConsistencies,
     /// Content hashes of the tables that the page rests on.
     pub hashes: Vec<(String, String)>,
 }
@@ -55,6 +58,7 @@ struct TorquePage<'a> {
     pictures: Vec<JointView>,
     contacts: Vec<Vec<String>>,
     inertials: Vec<Vec<String>>,
+    bodies: Vec<Vec<String>>,
     not_observable: Vec<&'a str>,
     remarks: Vec<&'a str>,
     hashes: &'a [(String, String)],
@@ -98,6 +102,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         pictures: (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect(),
         contacts: contacts(&tables.contacts),
         inertials: inertials(&tables.inertials),
+        bodies: bodies(&tables.consistency),
         not_observable: verdict.not_observable.lines().collect(),
         remarks: verdict.remarks.as_deref().map(|text| text.lines().collect()).unwrap_or_default(),
         hashes: &tables.hashes,
@@ -193,6 +198,19 @@ fn inertials(inertials: &Inertials) -> Vec<Vec<String>> {
         ]
     };
     inertials.0.iter().map(row).collect()
+}
+
+fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
+    let row = |row: &BodyConsistencyRow| {
+        vec![
+            format!("link {}", row.link),
+            significant(row.mass_kg, 4),
+            significant(row.spread_kg_m2, 3),
+            row.sigma_kg_m2.map_or_else(String::new, |sigma| significant(sigma, 2)),
+            if row.consistent { "a body has these numbers" } else { "no body has these numbers" }.into(),
+        ]
+    };
+    consistency.0.iter().map(row).collect()
 }
 
 fn pictures(tables: &TorqueTables, joint: usize) -> JointView {

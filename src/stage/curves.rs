@@ -27,7 +27,8 @@ pub(super) fn curves(
     prediction: &Prediction,
 ) -> Result<Curves> {
     let specs = model.stack.specs();
-    let sigma = sigmas(parameters);
+    let named = sigmas(parameters);
+    let sigma: Vec<Option<f64>> = specs.iter().map(|spec| named.get(spec.name.as_str()).copied()).collect();
     let shown: Vec<usize> = (0..data.rows().min(prediction.0.len())).filter(|row| !prediction.0[*row].suspect).collect();
     let whole = model.predict(data);
     let mut traced = Vec::new();
@@ -56,8 +57,7 @@ pub(super) fn curves(
         for (finding, out) in traced.iter().zip(&mut rows) {
             let Some((direction, scale)) = finding.direction(row, &motion, model) else { continue };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;
-            let variance: Option<f64> =
-                (finding.own.iter()).map(|k| Some((sigma.get(specs[*k].name.as_str())? * along(&derivatives[*k])).powi(2))).sum();
+            let variance: Option<f64> = (finding.own.iter()).map(|k| Some((sigma[*k]? * along(&derivatives[*k])).powi(2))).sum();
             let (over, x_unit, x) = abscissa((&finding.forms, finding.joint), data, row, &motion.posture.torque, &model.robot);
             let fitted = along(&finding.shift[row]);
             out.push(CurveRow {

@@ -40,6 +40,7 @@ impl Dependence {
             | Variable::Slip { joint, .. }
             | Variable::Stretch { joint, .. }
             | Variable::Recent { joint, .. }
+            | Variable::Circumstance { joint: Some(joint), .. }
             | Variable::Work { joint, .. } => self.joints[joint] = true,
             // How an arm hangs follows from all of its joints.
             Variable::Load { .. } | Variable::Push { .. } | Variable::ArmLoad => {
@@ -48,7 +49,7 @@ impl Dependence {
             }
             Variable::Payload => self.payload = true,
             Variable::Temperature | Variable::Lagging { .. } => self.temperature = true,
-            Variable::Time => {}
+            Variable::Time | Variable::Circumstance { joint: None, .. } => {}
             Variable::Gravity { .. }
             | Variable::LastMove
             | Variable::Speed

@@ -5,10 +5,11 @@ use crate::effect::{BaseFrame, CAUSES};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
-use crate::robot::{RobotModel, Visited};
+use crate::robot::{Measurements, RobotModel, Visited};
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::brought;
 use crate::stage::doubtful::{self, KnownModel};
+use crate::stage::misplaced_tool::misplaced_tool;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
@@ -95,7 +96,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 22;
+    const IMPLEMENTATION: u32 = 23;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -133,18 +134,8 @@ impl Stage for Diagnose {
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
         let own = own_effects(&self.effects, context)?;
-        let mut data = reads.recording.measurements();
         let asked = reads.split.rows(&reads.recording, &self.on)?;
-        let mut corrected = Corrected::RobotFile;
-        if let Some(simulated) = &reads.recording.simulated {
-            corrected = Corrected::OutsideSimulation;
-            let robot = RobotModel::new(reads.robot.to_description()?);
-            let message =
-                "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
-            data = against_simulation(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
-            context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
-            context.services.warn("parameters correct that simulation: they are not the robot file's".into());
-        }
+        let (data, corrected) = mismatch(&reads, &asked, context)?;
         if data.sequence.is_some() {
             let message =
                 "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
@@ -173,21 +164,25 @@ impl Stage for Diagnose {
             beside_simulation: corrected == Corrected::OutsideSimulation,
             seed: context.seed,
         };
-        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
+        context.services.begin("looking for what the model lacks", None, "steps");
+        let mut steps = 0;
+        let tell = |line: String| {
+            steps += 1;
+            context.services.note(line.clone());
+            context.services.advance(steps, &line);
+        };
+        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, tell));
         let mut diagnosis = said(diagnosis, &question, context)?;
         blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
             let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
-            for line in rounded_logs(&diagnosis.model, &data, &points) {
+            let rounded = rounded_logs(&diagnosis.model, &data, &points);
+            let events = brought::events(&diagnosis.model, &diagnosis.fitted, &data, &reads.recording, &diagnosis.kept);
+            for line in rounded.into_iter().chain(events) {
                 diagnosis.statement.push_str(&format!("; {line}"));
                 context.services.warn(line);
             }
-        }
-        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
-            for line in brought::events(&diagnosis.model, &diagnosis.fitted, &data, &reads.recording, &diagnosis.kept) {
-                diagnosis.statement.push_str(&format!("; {line}"));
-                context.services.warn(line);
-            }
+            misplaced_tool(&diagnosis.model, &diagnosis.fitted).into_iter().for_each(|line| context.services.warn(line));
         }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
@@ -224,6 +219,18 @@ impl Stage for Diagnose {
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })
     }
+}
+
+/// What is diagnosed, and what its parameters correct: the measurements, or what they differ by from an outside simulation.
+fn mismatch(reads: &DiagnoseReads, asked: &[usize], context: &Context) -> Result<(Measurements, Corrected)> {
+    let data = reads.recording.measurements();
+    let Some(simulated) = &reads.recording.simulated else { return Ok((data, Corrected::RobotFile)) };
+    let robot = RobotModel::new(reads.robot.to_description()?);
+    let message = "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
+    let data = against_simulation(&robot, &data, simulated, asked).ok_or_else(|| Error::data("table recording", message))?;
+    context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
+    context.services.warn("parameters correct that simulation: they are not the robot file's".into());
+    Ok((data, Corrected::OutsideSimulation))
 }
 
 /// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.

@@ -1,12 +1,13 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
-use crate::dynamics::{TorqueQuestion, TorqueRecording, diagnose};
+use crate::dynamics::{TorqueQuestion, diagnose};
 use crate::error::{Error, Fault, Result, counted};
-use crate::stage::dynamic_arm::{dynamic_arm, torque_per_ampere};
+use crate::stage::dynamic_arm::dynamic_arm;
+use crate::stage::torque_signal::torque_recording;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{
-    ArmMotion, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueFindings, TorqueNumbers,
-    TorqueRivals, TorqueVerdict,
+    ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueCovariance,
+    TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals, TorqueVerdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +25,8 @@ pub struct DiagnoseTorques {
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
     pub inertials: InertialSetting,
-    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from the recording.
+    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from how fast the joints come and go,
+    /// from 10 Hz to a tenth of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cutoff_hz: Option<f64>,
     /// Causes that are not tried and never named.
@@ -81,13 +83,16 @@ writes! {
         friction: FrictionCurves,
         inertials: Inertials,
         contacts: Contacts,
+        consistency: BodyConsistencies,
+        parameters: TorqueParameters,
+        covariance: TorqueCovariance,
     }
 }
 
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -119,42 +124,25 @@ impl Stage for DiagnoseTorques {
         if free {
             arm.links = None;
         }
-        let mut motion = reads.motion;
-        let held_out = self.held_out(&motion, context)?;
-        let (torque, from_current) = match (motion.torque.take(), motion.current.take()) {
-            (Some(torque), _) => (torque, false),
-            (None, Some(mut current)) => {
-                let factor = torque_per_ampere(&robot)?;
-                current.chunks_exact_mut(factor.len()).for_each(|row| row.iter_mut().zip(&factor).for_each(|(i, k)| *i *= k));
-                (current, true)
-            }
-            (None, None) => return Err(Error::data("table motion", "has neither torques nor currents")),
-        };
-        let recording = TorqueRecording {
-            joints: motion.joints,
-            time: motion.time,
-            position: motion.q,
-            velocity: motion.velocity,
-            torque,
-            temperature: motion.temperature,
-            trajectory: motion.trajectory.iter().map(|number| u32::try_from(*number).unwrap_or(u32::MAX)).collect(),
-            held_out,
-            from_current,
-        };
+        let held_out = self.held_out(&reads.motion, context)?;
+        let (recording, sequence) = torque_recording(reads.motion, &robot, held_out)?;
         let question =
             TorqueQuestion { free_inertials: free, cutoff: self.cutoff_hz, without: self.without.clone(), seed: context.seed };
         let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
         diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
         Ok(DiagnoseTorquesWrites {
-            verdict: TorqueVerdict::of(context.id, &diagnosis, from_current),
+            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.from_current),
             findings: TorqueFindings::of(&diagnosis),
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),
             joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints, &motion.sequence),
+            course: TorqueCourse::of(&diagnosis, recording.joints, &sequence),
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
+            consistency: BodyConsistencies::of(&diagnosis.model),
+            parameters: TorqueParameters::of(&diagnosis.model)?,
+            covariance: TorqueCovariance::of(&diagnosis.model)?,
         })
     }
 }

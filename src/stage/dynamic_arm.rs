@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 const ASSUMED: InertialTolerance = InertialTolerance { mass_relative: 0.05, centre: 0.01, inertia_relative: 0.2 };
 
 /// The arm, and what a person should know of what the robot file leaves open. Fails with a joint that slides.
-pub(super) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
+pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
     if let Some(joint) = robot.joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
         let message = format!("joint {} slides; torques are diagnosed of revolute joints alone", joint + 1);
         return Err(Error::data("table robot", message));
@@ -72,7 +72,7 @@ fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMomen
 }
 
 /// Nm at the joint per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
-pub(super) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
+pub(crate) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
     let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
     let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();
     let missing: Vec<String> =

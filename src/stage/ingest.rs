@@ -1,10 +1,11 @@
-//! `ingest`: from raw files (delimited text or Parquet) to one recording; what is not used goes to `rejected` with file, line and reason.
+//! `ingest`: from raw files (text, workbooks, columns) to one recording; what is not used goes to `rejected` with file, line and reason.
 //!
 //! Files are read twice: first to judge rows and find duplicates and partners, then to write; so nothing is written of a
 //! file that is refused, and memory stays bounded. Per file, accepted + rejected = read.
 
 mod arm;
 mod axes;
+mod batches;
 mod bind;
 mod channel;
 mod check;
@@ -12,6 +13,8 @@ mod clock;
 mod columns;
 mod copies;
 pub mod encoding;
+mod feather;
+mod joined;
 mod later;
 mod layout;
 mod lines;
@@ -23,6 +26,7 @@ mod number;
 mod pair;
 mod parquet;
 mod reading;
+mod record;
 mod rejections;
 mod row;
 mod scan;
@@ -32,6 +36,7 @@ mod torques;
 mod twice;
 mod verdict;
 mod wide;
+mod workbook;
 mod write;
 
 pub use clock::is_clock_time;
@@ -156,17 +161,17 @@ impl Stage for Ingest {
         for one in &measurements {
             let scan = |(index, layout)| scan::scan(one, index, layout, &arm, context);
             let mut scans = one.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
-            let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
-            verdict::judge(one, &scans, &fates, &arm, context)?;
-            scanned.push((scans, fates));
+            let decisions = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
+            verdict::judge(one, &scans, &decisions, &arm, context)?;
+            scanned.push((scans, decisions));
         }
         copies::refuse(&scanned)?;
         let names = names(scanned.iter().flat_map(|(scans, _)| scans));
         let each = measurements.iter().zip(&scanned).zip(names.chunks(self.files.len().max(1)));
-        let decided: Vec<write::JoinDecisions> = each
-            .map(|((settings, (scans, fates)), names)| write::JoinDecisions { settings, arm: &arm, scans, fates, names })
+        let decided: Vec<joined::JoinDecisions> = each
+            .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
             .collect();
-        let gaps: Vec<f64> = self.later.iter().map(|later| later.gap_s).collect();
+        let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
         let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })
@@ -207,10 +212,10 @@ fn names<'a>(scans: impl Iterator<Item = &'a scan::Scan>) -> Vec<String> {
     numbered.collect()
 }
 
-fn intake(decided: &[write::JoinDecisions], context: &Context) -> Intake {
+fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {
     let mut rows: Vec<IntakeRow> = Vec::new();
-    for ((scan, fate), name) in decided.iter().flat_map(|one| one.scans.iter().zip(one.fates).zip(one.names)) {
-        let accepted = verdict::accepted(scan, fate);
+    for ((scan, decision), name) in decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).zip(one.names)) {
+        let accepted = verdict::accepted(scan, decision);
         let rejected = scan.read - accepted;
         context.services.note(format!("{name}: {} read, {accepted} used, {rejected} rejected", counted(scan.read, "row")));
         rows.push(IntakeRow {

@@ -4,6 +4,7 @@
 //! else the table `network` stays empty and the prediction is what it was. The table `corrections` says how all of them did.
 //! Outside the region of its training rows a correction fades to zero.
 
+mod corrected;
 mod told;
 
 use crate::error::{Error, Fault, Result, counted};
@@ -15,6 +16,7 @@ use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::statistics::nearest;
 use crate::table::{Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training};
+use corrected::corrected;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -363,43 +365,4 @@ fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> V
 /// Residual of a row, m.
 fn residual(row: &PredictionRow) -> [f64; OUTPUTS] {
     [row.dx_mm, row.dy_mm, row.dz_mm].map(|value| value * 1e-3)
-}
-
-/// Every prediction with the correction; rows that were trained on are no longer held out.
-fn corrected(
-    prediction: &Prediction,
-    network: &Network,
-    recording: &Recording,
-    sources: &[Vec<f64>],
-    trained: &[usize],
-    context: &Context,
-) -> Result<Prediction> {
-    // Read back from its table, so that whoever applies the table later gets these very numbers.
-    let correction = network.correction(&recording.prismatic)?;
-    let mut rows = prediction.0.clone();
-    let (mut fading, mut outside) = (0, 0);
-    for (row, sources) in rows.iter_mut().zip(sources) {
-        row.step = context.id.into();
-        let Some(correction) = &correction else { continue };
-        let applied = correction.at(sources);
-        outside += usize::from(applied.share == 0.0);
-        fading += usize::from(applied.share > 0.0 && applied.share < 1.0);
-        let [x, y, z] = applied.delta.map(|value| value * 1e3);
-        (row.x_mm, row.y_mm, row.z_mm) = (row.x_mm + x, row.y_mm + y, row.z_mm + z);
-        (row.dx_mm, row.dy_mm, row.dz_mm) = (row.dx_mm - x, row.dy_mm - y, row.dz_mm - z);
-        row.error_mm = (row.dx_mm * row.dx_mm + row.dy_mm * row.dy_mm + row.dz_mm * row.dz_mm).sqrt();
-        // Cross-validation was of the model without a correction, whichever rows the correction learned from.
-        (row.fold_error_mm, row.block_error_mm) = (None, None);
-    }
-    for row in trained {
-        rows[*row].held_out = false;
-    }
-    if fading + outside > 0 {
-        context.services.note(format!(
-            "{} of {} rows lie outside the region (joints, payload) that the correction saw: it fades out on {fading} and is silent on {outside}",
-            fading + outside,
-            rows.len()
-        ));
-    }
-    Ok(Prediction(rows))
 }

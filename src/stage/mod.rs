@@ -4,6 +4,7 @@ mod advice;
 mod blank_payload;
 mod brought;
 mod compare;
+mod compare_torques;
 mod computed;
 mod copied;
 mod curves;
@@ -18,6 +19,7 @@ mod identify;
 pub mod ingest;
 mod known_cell;
 pub mod learn;
+mod misplaced_tool;
 mod named_column;
 mod optimise;
 mod own_effects;
@@ -33,13 +35,16 @@ mod simulate;
 pub mod split;
 mod stiffness;
 mod text_file;
+mod torque_signal;
 mod transfer;
 mod validate;
 mod weightless;
 
 pub use compare::{Compare, CompareReads};
+pub use compare_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use diagnose_torques::{DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting};
+pub(crate) use dynamic_arm::{dynamic_arm, torque_per_ampere};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
@@ -350,6 +355,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),

@@ -2,7 +2,7 @@
 
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result};
-use crate::report::{AcceptanceLimits, ReportOptions, Tables, pages};
+use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages};
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
@@ -22,6 +22,8 @@ pub struct Report {
     pub title: Option<String>,
     /// The held-out set that the first sentence speaks of; without it, the one with most points after the step that stands for the run.
     pub set: Option<String>,
+    /// PageLanguage of the page with its certificate: `en` or `de`.
+    pub language: PageLanguage,
     /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step. Beyond it `calib run` says
     /// so and ends with code 1.
     pub limits: Accepted,
@@ -77,7 +79,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 17;
+    const IMPLEMENTATION: u32 = 18;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -138,7 +140,7 @@ impl Stage for Report {
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
         let limits = AcceptanceLimits { mean_mm, p95_mm, max_mm };
         let (title, set) = (self.title.as_deref(), self.set.as_deref());
-        let options = ReportOptions { title, set, limits, identity: &self.identity, hashes };
+        let options = ReportOptions { title, set, limits, language: self.language, identity: &self.identity, hashes };
         let pages = pages(&tables, &options).map_err(|error| placed(error, context.id))?;
         let document =
             |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };

@@ -4,8 +4,8 @@ use crate::error::Result;
 use crate::report::{TorqueTables, torque_page};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{
-    Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques, Robot, Table, TorqueCourse, TorqueFindings,
-    TorqueNumbers, TorqueRivals, TorqueVerdict,
+    BodyConsistencies, Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques, Robot, Table, TorqueCourse,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,7 @@ reads! {
         friction: FrictionCurves,
         inertials: Inertials,
         contacts: Contacts,
+        consistency: BodyConsistencies,
     }
 }
 writes! {
@@ -43,7 +44,7 @@ writes! {
 impl Stage for ReportTorques {
     const NAME: &'static str = "report_torques";
     const SUMMARY: &'static str = "writes one self-contained HTML file: torques before and after, friction, what was found";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = ReportTorquesReads;
     type Writes = ReportTorquesWrites;
 
@@ -65,6 +66,7 @@ impl Stage for ReportTorques {
             friction: reads.friction,
             inertials: reads.inertials,
             contacts: reads.contacts,
+            consistency: reads.consistency,
             hashes,
         };
         let content = torque_page(&tables, self.title.as_deref())?;

@@ -4,8 +4,9 @@
 //! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted. Copies of a row under
 //! other ids go wherever they stand to the set of that row.
 
+mod stops;
+
 use crate::error::{Error, Fault, Result, counted};
-use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::stage::copied::{self, copied_rows};
 use crate::stage::named_column::NamedColumn;
 use crate::stage::parameter_set::matches;
@@ -17,7 +18,7 @@ use rand::seq::SliceRandom;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
+use stops::{poses, stops};
 
 /// How rows are dealt out to sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -325,37 +326,6 @@ impl SplitBy {
             Self::Order { sets } => by_order(rows, sets),
         }
     }
-}
-
-/// Rows one by one, or where targets are named, all that were measured one after the other in a pose.
-fn stops(recording: &Recording) -> Vec<Range<usize>> {
-    let mut stops: Vec<Range<usize>> = Vec::new();
-    for row in 0..recording.rows() {
-        let joins = |stop: &Range<usize>| {
-            let Some(targets) = &recording.target else { return false };
-            let new = stop.clone().all(|other| targets[other] != targets[row]);
-            new && near(recording.q(stop.start), recording.q(row), NEAR)
-        };
-        match stops.last_mut() {
-            Some(last) if joins(last) => last.end = row + 1,
-            _ => stops.push(row..row + 1),
-        }
-    }
-    stops
-}
-
-/// Stretches of neighbouring rows with the same joints, the targets of a pose together.
-fn poses(recording: &Recording) -> Vec<Range<usize>> {
-    let mut poses: Vec<Range<usize>> = Vec::new();
-    for stop in stops(recording) {
-        let (named, joints) = (stop.len() > 1, recording.q(stop.start));
-        let limit = if named { NEAR } else { SAME };
-        match poses.last_mut() {
-            Some(last) if near(recording.q(last.start), joints, limit) => last.end = stop.end,
-            _ => poses.push(stop),
-        }
-    }
-    poses
 }
 
 fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blank: Option<&str>) -> Result<Vec<String>> {

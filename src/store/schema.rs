@@ -15,6 +15,7 @@ use crate::units::Unit;
 
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
+    include_str!("../../schemas/body_consistency.json"),
     include_str!("../../schemas/changes.json"),
     include_str!("../../schemas/contacts.json"),
     include_str!("../../schemas/convention.json"),
@@ -49,9 +50,12 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),
+    include_str!("../../schemas/torque_changes.json"),
     include_str!("../../schemas/torque_course.json"),
+    include_str!("../../schemas/torque_covariance.json"),
     include_str!("../../schemas/torque_findings.json"),
     include_str!("../../schemas/torque_numbers.json"),
+    include_str!("../../schemas/torque_parameters.json"),
     include_str!("../../schemas/torque_rivals.json"),
     include_str!("../../schemas/torque_verdict.json"),
     include_str!("../../schemas/training.json"),

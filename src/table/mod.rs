@@ -67,6 +67,7 @@ macro_rules! rows {
 }
 pub(crate) use rows;
 
+mod body_consistency;
 mod changes;
 mod contacts;
 mod convention;
@@ -97,13 +98,16 @@ mod split;
 mod standing;
 mod statistics;
 mod suspects;
+mod torque_changes;
 mod torque_course;
 mod torque_findings;
+mod torque_parameters;
 mod torque_verdict;
 mod training;
 mod truth;
 mod verdict;
 
+pub use body_consistency::{BodyConsistencies, BodyConsistencyRow};
 pub use changes::{ChangeRow, Changes};
 pub use contacts::{ContactRow, Contacts};
 pub use convention::{JointConventionRow, JointConventions};
@@ -135,8 +139,10 @@ pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
+pub use torque_changes::{TorqueChangeRow, TorqueChangeTable};
 pub use torque_course::TorqueCourse;
 pub use torque_findings::{TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals};
+pub use torque_parameters::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorqueParameters};
 pub use torque_verdict::{TorqueVerdict, TorqueVerdictRow};
 pub use training::{Training, TrainingRow};
 pub use truth::{Truth, TruthRow};
@@ -144,6 +150,7 @@ pub use verdict::{Verdict, VerdictRow};
 
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
+    BodyConsistencies::KIND,
     Changes::KIND,
     Contacts::KIND,
     JointConventions::KIND,
@@ -178,9 +185,12 @@ pub const TABLES: &[&str] = &[
     Split::KIND,
     Statistics::KIND,
     Suspects::KIND,
+    TorqueChangeTable::KIND,
     TorqueCourse::KIND,
+    TorqueCovariance::KIND,
     TorqueFindings::KIND,
     TorqueNumbers::KIND,
+    TorqueParameters::KIND,
     TorqueRivals::KIND,
     TorqueVerdict::KIND,
     Training::KIND,

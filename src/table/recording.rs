@@ -1,17 +1,18 @@
 //! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
 
-mod columns;
-
-pub use columns::columns;
-
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{Measurements, Memories, Named, NoiseBasis, START, Sequence, SigmaSource};
+use crate::robot::{CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, START, Sequence, SigmaSource, law_columns};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+
+/// All columns, in the order in which people see them: circumstances, and what kinds of measurement own.
+pub fn columns() -> impl Iterator<Item = &'static DeclaredColumn> {
+    CIRCUMSTANCES.iter().chain(KINDS.iter().flat_map(|kind| kind.about().columns))
+}
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 ///
@@ -52,7 +53,7 @@ pub struct Recording {
     pub velocity: Option<Vec<f64>>,
     /// The target that was measured; the tool point where a row names none.
     pub target: Option<Vec<Option<String>>>,
-    /// What was measured beside points: numbers of a setting, SI, row-major; NaN where a row measured none.
+    /// What was measured beside points, and other circumstances: numbers of a setting, SI, row-major; NaN where a row has none.
     pub readings: BTreeMap<&'static str, Vec<f64>>,
     /// Associated names, e.g. of anchors.
     pub names: BTreeMap<&'static str, Vec<Option<String>>>,
@@ -100,6 +101,9 @@ impl Recording {
             current: self.current.clone(),
             time: self.time.clone(),
             temperature: self.temperature.clone(),
+            circumstances: law_columns()
+                .filter_map(|column| Some((column.setting, self.readings.get(column.setting)?.clone())))
+                .collect(),
             direction: self.direction.clone(),
             velocity: self.velocity.clone(),
             noise_basis: if is_inferred { NoiseBasis::Inferred } else { NoiseBasis::Instrument },

@@ -8,10 +8,12 @@ mod measured;
 pub mod parquet;
 mod row;
 pub mod text;
+mod trajectory;
 mod whole;
 
 pub use columns::Units;
 pub use measured::{MeasuredTarget, measured};
+pub use trajectory::Trajectory;
 pub use whole::{unwritten, whole};
 
 use crate::description::RobotDescription;

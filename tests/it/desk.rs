@@ -1,7 +1,9 @@
 //! A stand-in for the engine: runs a stage on files in memory and keeps what it writes.
 
 use calib::error::{Error, Result};
-use calib::stage::{Context, OpenedInput, Output, RawFile, Services, Sink, Stage, Streamed, Writes};
+use calib::stage::{
+    Context, ErasedStage, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
+};
 use calib::store::frame::Frame;
 use calib::table::Table;
 use std::collections::BTreeMap;
@@ -28,15 +30,29 @@ impl Desk {
     }
     /// Runs a stage and gives the chunks of each table that it wrote.
     pub fn run<S: Stage>(&self, stage: &S, reads: S::Reads) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
+        self.written(&S::Writes::ports(), |context| stage.run(reads, context)?.give())
+    }
+    /// The same of a stage whose type is not known, on the tables of each of its ports.
+    pub fn run_any(
+        &self,
+        entry: &StageEntry,
+        stage: &dyn ErasedStage,
+        frames: Vec<Vec<(String, Frame)>>,
+    ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
+        self.written(&(entry.writes)(), |context| stage.run(frames, context))
+    }
+    fn written(
+        &self,
+        ports: &[Port],
+        run: impl FnOnce(&Context) -> Result<Vec<Output>>,
+    ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
         self.chunks.lock().unwrap().clear();
-        let context = Context { id: "stage", seed: 7, jobs: 1, services: self };
-        let ports: Vec<&'static str> = S::Writes::ports().iter().map(|port| port.kind).collect();
-        let outputs = stage.run(reads, &context)?.give()?;
+        let outputs = run(&Context { id: "stage", seed: 7, jobs: 1, services: self })?;
         let mut tables = std::mem::take(&mut *self.chunks.lock().unwrap());
-        for (kind, output) in ports.into_iter().zip(outputs) {
+        for (port, output) in ports.iter().zip(outputs) {
             match output {
-                Output::Frame(frame) => drop(tables.insert(kind, vec![frame])),
-                Output::Streamed(streamed) => assert_eq!(streamed.kind, kind),
+                Output::Frame(frame) => drop(tables.insert(port.kind, vec![frame])),
+                Output::Streamed(streamed) => assert_eq!(streamed.kind, port.kind),
             }
         }
         Ok(tables)

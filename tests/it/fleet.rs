@@ -6,7 +6,7 @@ mod names;
 mod recalibrated;
 mod rosters;
 
-use crate::held;
+use crate::held_locks;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -155,7 +155,7 @@ fn a_cancelled_run_stops_and_the_next_goes_on() {
     let mut command = fleet("run", &file, &store);
     command.args(["--quiet", "-j", "1"]).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
     let mut child = command.spawn().unwrap();
-    held::until(&mut child, || !killed::records(&store, "line").is_empty());
+    held_locks::until(&mut child, || !killed::records(&store, "line").is_empty());
     let (result, said) = output(&mut fleet("cancel", &file, &store));
     assert!(result.status.success(), "{said}");
     assert_eq!(child.wait().unwrap().code(), Some(75));

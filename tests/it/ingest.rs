@@ -2,6 +2,7 @@
 
 mod clocks;
 mod counting;
+mod feather;
 mod foreign;
 mod kinds;
 mod later;

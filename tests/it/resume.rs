@@ -1,6 +1,6 @@
 //! A run that is killed goes on where it stood, and ends with the tables of an undisturbed one.
 
-use crate::held;
+use crate::held_locks;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -58,7 +58,7 @@ struct Undisturbed {
 static UNDISTURBED: LazyLock<Undisturbed> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let result = run(calib(folder.path()).args(["--jobs", "2"]));
-    let actions = held::actions_of(folder.path(), result["run_id"].as_str().unwrap());
+    let actions = held_locks::actions_of(folder.path(), result["run_id"].as_str().unwrap());
     Undisturbed { stages: executed(&result), hashes: hashes(&result), actions }
 });
 
@@ -70,13 +70,13 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         let store = folder.path().join(format!("killed-{round}"));
         // No run comes past this stage while it is held, so that it is killed before its end on any machine.
         let barrier = random.random_range(1..UNDISTURBED.stages);
-        let held = held::action(&store, &UNDISTURBED.actions[barrier]);
+        let held = held_locks::action(&store, &UNDISTURBED.actions[barrier]);
         let mut seen = 0;
         // Twice in a row: what a killed run left, and what a killed resumption left.
         for _ in 0..2 {
             let mut child = calib(&store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
             let enough = random.random_range(1..=barrier);
-            held::until(&mut child, || actions(&store).len() >= enough);
+            held_locks::until(&mut child, || actions(&store).len() >= enough);
             // Somewhere in the next stage, or at the barrier.
             std::thread::sleep(Duration::from_millis(random.random_range(0..60)));
             child.kill().unwrap();
@@ -122,13 +122,13 @@ fn two_runs_at_once_share_their_work() {
 fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
     let folder = tempfile::tempdir().unwrap();
     // Nobody comes past the first stage.
-    let _held = held::action(folder.path(), &UNDISTURBED.actions[0]);
+    let _held = held_locks::action(folder.path(), &UNDISTURBED.actions[0]);
     let mut child = calib(folder.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let manifest = || {
         let runs = std::fs::read_dir(folder.path().join("runs")).into_iter().flatten().flatten();
         runs.map(|entry| entry.path().join("manifest.json")).find(|path| path.is_file())
     };
-    held::until(&mut child, || manifest().is_some());
+    held_locks::until(&mut child, || manifest().is_some());
     child.kill().unwrap();
     child.wait().unwrap();
     let manifest: Value = serde_json::from_slice(&std::fs::read(manifest().unwrap()).unwrap()).unwrap();
@@ -140,14 +140,14 @@ fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
 fn the_log_counts_the_stages_that_a_killed_run_finished() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
-    let _held = held::action(store, &UNDISTURBED.actions[3]);
+    let _held = held_locks::action(store, &UNDISTURBED.actions[3]);
     let mut child = calib(store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let ended = || {
         let runs = std::fs::read_dir(store.join("runs")).into_iter().flatten().flatten();
         let events = runs.filter_map(|run| std::fs::read_to_string(run.path().join("events.jsonl")).ok());
         events.map(|text| text.lines().filter(|line| line.contains("\"ends\"")).count()).sum::<usize>()
     };
-    held::until(&mut child, || ended() == 3);
+    held_locks::until(&mut child, || ended() == 3);
     child.kill().unwrap();
     child.wait().unwrap();
     let log = Command::new(env!("CARGO_BIN_EXE_calib")).args(["log", "--store"]).arg(store).output().unwrap();

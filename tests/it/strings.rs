@@ -73,7 +73,7 @@ fn literals(text: &str) -> Vec<String> {
 }
 
 /// Every sentence with the file that says it.
-fn sentences() -> BTreeSet<(String, String)> {
+pub(crate) fn sentences() -> BTreeSet<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let each = files(&root).into_iter().flat_map(|path| {
         let name = path.strip_prefix(&root).expect("below src").to_string_lossy().replace('\\', "/");

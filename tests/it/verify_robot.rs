@@ -56,7 +56,14 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
     assert!(figure("achieved", "max_mm") < 0.02, "{told:#}");
     assert!(figure("predicted_u95", "mean_mm") < 0.05, "{told:#}");
     assert_eq!((told["points"].as_u64(), told["iso_9283"][0]["cycles"].as_u64()), (Some(42), Some(30)), "{told:#}");
-    let text = run(&["verify-robot", "cell/pipeline.yaml", "second.csv", "--new-base", "--quiet"]);
+    let text = run(&["verify-robot", "cell/pipeline.yaml", "second.csv", "--new-base", "--quiet", "--html", "verified.html"]);
     assert!(text.contains("achieved  mean 0.00") && text.contains("the tracker's place found anew"), "{text}");
     assert!(text.contains("ISO 9283  pose 1, 30 cycles: accuracy AP 0.0"), "{text}");
+    // The page has the figures of the terminal.
+    let page = std::fs::read_to_string(folder.path().join("verified.html")).expect("a page");
+    let line = text.lines().find(|line| line.starts_with("achieved")).expect("a line");
+    let numbers: Vec<&str> = line.split(' ').filter(|word| word.len() > 4 && word.parse::<f64>().is_ok()).collect();
+    assert_eq!(numbers.len(), 3, "{line}");
+    assert!(numbers.iter().all(|number| page.contains(&format!("<td>{number}</td>"))), "{numbers:?}");
+    assert!(page.contains("<th scope=\"row\">1</th><td>30</td>") && page.matches("<svg ").count() == 1, "{page}");
 }

@@ -4,6 +4,7 @@
 #     sh tests/reference/newcomer.sh            # builds calib first, as the README does
 #     CALIB=target/debug/calib sh tests/reference/newcomer.sh
 #
+# Twelve other ways of writing one's files: tests/reference/newcomer_data.py; wrong set-ups: tests/reference/setups.py.
 # The files of the "own" cell are those of a simulated robot with a concealed cause; its data sheet is pipelines/sr210d/robot.yaml.
 set -eu
 clone=$(cd "$(dirname "$0")/../.." && pwd)

@@ -3,11 +3,12 @@
 use super::super::surroundings::cores;
 use super::super::{emit, emit_json};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
+use crate::proof::{ConcealedSet, RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::Collection;
 use crate::twin::conceal::layout::{LAYOUTS, Layout};
 use crate::twin::conceal::robots::ALL_KINDS;
+use crate::twin::torque::TorqueDesign;
 use crate::twin::tracker::{SCATTERS, Scatter};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -18,13 +19,17 @@ use std::path::PathBuf;
 /// DIR/recordings/CASE holds what a user has: robot.json, controller.csv, tracker.csv. DIR/sealed/CASE.json holds the truth, and
 /// DIR/seal.json the SHA-256 of every file. The same seed gives the same bytes. Effects are made by other mathematics than those
 /// that `diagnose` knows, many in other forms, and sized so that they range from hardly visible to plain.
+///
+/// With --dynamics recordings are torques or motor currents of an arm that moves (robot.json, recording.csv), for
+/// `calib diagnose pipelines/dynamics/pipeline.yaml`; most joints have friction beside what is concealed.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25
   calib simulate conceal --out gears --cases 20 --family gear_cyclic,backlash --robot sr210d --points 200
   calib simulate conceal --out pairs --seed 3 --cases 30 --pairs 1
   calib simulate conceal --out strange --cases 30 --open 1
-  calib simulate conceal --out further --cases 30 --families beyond")]
+  calib simulate conceal --out further --cases 30 --families beyond
+  calib simulate conceal --out moving --cases 30 --dynamics --nulls 0.2 --pairs 0.2")]
 pub(super) struct ConcealArguments {
     /// The folder to make; it must not exist, or be empty
     #[arg(long, short, value_name = "DIR")]
@@ -35,6 +40,15 @@ pub(super) struct ConcealArguments {
     /// Recordings to make
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=9999))]
     cases: u32,
+    /// Torques of an arm that moves instead of points
+    #[arg(long, conflicts_with_all = OF_POINTS)]
+    dynamics: bool,
+    /// Seconds of a recording of torques: 55 % are to fit, the rest judges
+    #[arg(long, value_name = "S", default_value_t = 48.0, requires = "dynamics")]
+    seconds: f64,
+    /// Rows a second of a recording of torques
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, requires = "dynamics")]
+    rate: f64,
     /// The list that effects are drawn from
     #[arg(long, value_enum, value_name = "LIST", default_value_t = Families::Library)]
     families: Families,
@@ -90,6 +104,10 @@ pub(super) struct ConcealArguments {
     pub(super) json: bool,
 }
 
+/// Options that only recordings of points have.
+const OF_POINTS: [&str; 10] =
+    ["families", "family", "robot", "points", "natural", "faulty", "scatter", "bare", "log_step", "layout"];
+
 /// The lists of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Families {
@@ -108,23 +126,28 @@ impl ConcealArguments {
 pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
     let design = design(arguments)?;
     vacant(&arguments.out)?;
-    let points = conceal(&arguments.out, &design, arguments.threads())?;
+    let rows = conceal(&arguments.out, &design, arguments.threads())?;
+    let row = if arguments.dynamics { "row" } else { "point" };
     let (recordings, seal) = (arguments.out.join(RECORDINGS), arguments.out.join(SEAL));
     if arguments.json {
-        return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
+        return emit_json(&json!({ "cases": design.cases(), (format!("{row}s")): rows, "recordings": recordings, "seal": seal }));
     }
     emit(&format!(
         "{}, {}: {}\nseal: {}\n",
-        counted(design.cases, "recording"),
-        counted(points, "point"),
+        counted(design.cases(), "recording"),
+        counted(rows, row),
         recordings.display(),
         seal.display()
     ))
 }
 
 /// The design that the options state; fails with every fault of them.
-pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
-    let mut faults = Vec::new();
+pub(super) fn design(arguments: &ConcealArguments) -> Result<ConcealedSet> {
+    if arguments.dynamics { torques(arguments) } else { points(arguments) }
+}
+
+/// Faults of the shares that both kinds of recordings have.
+fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
     let shares = [
         ("--nulls", arguments.nulls),
         ("--pairs", arguments.pairs),
@@ -133,14 +156,41 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         ("--natural", arguments.natural),
         ("--faulty", arguments.faulty),
     ];
-    for (option, share) in shares {
-        if !(0.0..=1.0).contains(&share) {
-            faults.push(Fault::new(option, format!("{share} is no share; allowed: 0 to 1")));
-        }
-    }
+    let wrong = shares.into_iter().filter(|(_, share)| !(0.0..=1.0).contains(share));
+    let mut faults: Vec<Fault> =
+        wrong.map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1"))).collect();
     if arguments.nulls + arguments.pairs + arguments.open > 1.0 + 1e-9 {
         faults.push(Fault::new("--nulls, --pairs, --open", "add up to more than 1"));
     }
+    faults
+}
+
+fn torques(arguments: &ConcealArguments) -> Result<ConcealedSet> {
+    let mut faults = shares(arguments);
+    for (option, value, [least, most]) in
+        [("--seconds", arguments.seconds, [16.0, 3600.0]), ("--rate", arguments.rate, [20.0, 5000.0])]
+    {
+        if !(least..=most).contains(&value) {
+            faults.push(Fault::new(option, format!("{value}; allowed: {least} to {most}")));
+        }
+    }
+    if !faults.is_empty() {
+        return Err(Error::Spec(faults));
+    }
+    Ok(ConcealedSet::Torques(TorqueDesign {
+        seed: arguments.seed,
+        cases: arguments.cases as usize,
+        nulls: arguments.nulls,
+        pairs: arguments.pairs,
+        open: arguments.open,
+        other_forms: arguments.other_forms,
+        seconds: arguments.seconds,
+        rate: arguments.rate,
+    }))
+}
+
+fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
+    let mut faults = shares(arguments);
     let collection = match arguments.families {
         Families::Library => Collection::Library,
         Families::Beyond => Collection::Beyond,
@@ -187,7 +237,7 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
     }
-    Ok(Design {
+    Ok(ConcealedSet::Positions(Box::new(Design {
         seed: arguments.seed,
         cases: arguments.cases as usize,
         collection,
@@ -206,7 +256,7 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         log_step_deg: arguments.log_step,
         layout,
         tool_mass_kg: arguments.tool_mass,
-    })
+    })))
 }
 
 fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {

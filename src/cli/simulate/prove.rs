@@ -4,7 +4,7 @@ use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
-use crate::proof::{self, RECORDINGS, SEAL, SEALED, Seal};
+use crate::proof::{self, ConcealedSet, RECORDINGS, SEAL, SEALED, Seal};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -19,13 +19,15 @@ use std::process::{Command, Stdio};
 #[command(after_help = "Examples:
   calib simulate prove --out proof --seed 7 --cases 60 --nulls 0.2 --pairs 0.2 --open 0.1
   calib simulate prove --out gears --cases 30 --family gear_cyclic,gear_motor_cyclic --json > score.json
-  calib simulate prove --out further --seed 7 --cases 300 --families beyond")]
+  calib simulate prove --out further --seed 7 --cases 300 --families beyond
+  calib simulate prove --out moving --seed 7 --cases 60 --dynamics --nulls 0.2 --pairs 0.2 --open 0.1")]
 pub(super) struct ProveArguments {
     #[command(flatten)]
     conceal: ConcealArguments,
-    /// The pipeline with a stage `diagnose` and a variable `case`
-    #[arg(long, value_name = "PIPELINE", default_value = "pipelines/case/pipeline.yaml")]
-    pipeline: PathBuf,
+    /// The pipeline with a stage that diagnoses and a variable `case` [default: pipelines/case/pipeline.yaml; of torques
+    /// pipelines/dynamics/pipeline.yaml]
+    #[arg(long, value_name = "PIPELINE")]
+    pipeline: Option<PathBuf>,
     /// Prints no progress
     #[arg(long, short)]
     quiet: bool,
@@ -33,10 +35,20 @@ pub(super) struct ProveArguments {
 
 const VERDICTS: &str = "verdicts";
 
+/// Where a set's recordings are read and diagnosed.
+fn pipeline(arguments: &ProveArguments, set: &ConcealedSet) -> PathBuf {
+    let usual = match set {
+        ConcealedSet::Positions(_) => "pipelines/case/pipeline.yaml",
+        ConcealedSet::Torques(_) => "pipelines/dynamics/pipeline.yaml",
+    };
+    arguments.pipeline.clone().unwrap_or_else(|| usual.into())
+}
+
 pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     let (design, folder) = (conceal::design(&arguments.conceal)?, &arguments.conceal.out);
-    if !arguments.pipeline.is_file() {
-        return Err(Error::spec("--pipeline", format!("no such file: {}", arguments.pipeline.display())));
+    let pipeline = pipeline(arguments, &design);
+    if !pipeline.is_file() {
+        return Err(Error::spec("--pipeline", format!("no such file: {}", pipeline.display())));
     }
     if folder.join(SEAL).is_file() {
         if !Seal::read(folder)?.is_of(&design) {
@@ -56,7 +68,7 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     let program = std::env::current_exe().map_err(store)?;
     let told = in_order(arguments.conceal.threads(), names.len(), |number| -> Result<()> {
         let name = &names[number];
-        let said = diagnose(&program, arguments, name)?;
+        let said = diagnose(&program, &pipeline, folder, name)?;
         if !arguments.quiet {
             let _ = writeln!(std::io::stderr(), "{name}: {said}");
         }
@@ -79,8 +91,7 @@ fn case(name: &str) -> Option<String> {
 }
 
 /// Has one recording diagnosed and keeps the verdict; gives a line about it. Fails where the process cannot be started.
-fn diagnose(program: &Path, arguments: &ProveArguments, name: &str) -> Result<String> {
-    let folder = &arguments.conceal.out;
+fn diagnose(program: &Path, pipeline: &Path, folder: &Path, name: &str) -> Result<String> {
     let verdict = folder.join(VERDICTS).join(format!("{name}.json"));
     if verdict.is_file() {
         return Ok("diagnosed before".into());
@@ -90,7 +101,7 @@ fn diagnose(program: &Path, arguments: &ProveArguments, name: &str) -> Result<St
     let recording = std::path::absolute(folder.join(RECORDINGS).join(name)).map_err(fault)?;
     let tables = folder.join(VERDICTS).join(name).with_extension("store");
     let mut command = Command::new(program);
-    command.arg("diagnose").arg(&arguments.pipeline).arg("--set").arg(format!("case={}", recording.display()));
+    command.arg("diagnose").arg(pipeline).arg("--set").arg(format!("case={}", recording.display()));
     command.args(["--json", "--quiet", "--jobs", "1", "--store"]).arg(&tables).stdin(Stdio::null());
     let done = command.output().map_err(fault)?;
     let _ = std::fs::remove_dir_all(&tables);

@@ -105,11 +105,7 @@ impl Uncertainty {
 
     /// The same by each effect at a place alone.
     pub(super) fn by_effect(&self, derivatives: &[f64]) -> Vec<(String, f64)> {
-        let variance = |source: &Source| {
-            let mut own = vec![0.0; derivatives.len()];
-            source.parameters.iter().for_each(|row| own[*row] = derivatives[*row]);
-            self.variance(&own)
-        };
+        let variance = |source: &Source| self.covariance.along_rows(derivatives, &source.parameters);
         self.sources.iter().map(|source| (source.name.clone(), variance(source))).collect()
     }
 

@@ -59,6 +59,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     let (mut history, mut located, mut first) = (RoundHistory::default(), None, None);
     let mut earlier = None;
     loop {
+        tell(words::of_the_search(&now));
         let view = RoundView::of(&now, &fitter);
         let survey = view.survey();
         let mut pool = view.pool(&now, &fitter, &survey, earlier.take());

@@ -167,6 +167,27 @@ fn a_payload_that_was_not_declared_is_found_with_its_mass() {
     let diagnosis = diagnosed(&record(&real, 0.0, &|_| 0.0));
     assert_eq!(found(&diagnosis), ["payload_error tool"]);
     assert!((number(&diagnosis, "payload_error", "mass") - 1.5).abs() < 0.03 * 3.5);
+    assert!(!diagnosis.not_observable.iter().any(|said| said.contains("payload")), "{:?}", diagnosis.not_observable);
+}
+
+#[test]
+fn rows_that_are_lost_now_and_then_change_no_finding_and_are_told() {
+    let mut holed = record(&arm(), 0.0, &|row| if row.0 == 2 { 4.0 * (row.3 / 0.003).tanh() } else { 0.0 });
+    let whole = holed.clone();
+    // Two rows of each 60: every stretch between would be too short to be filtered.
+    let kept = |row: usize| row % 60 < 58;
+    let of = |values: &[f64], width: usize| -> Vec<f64> {
+        values.chunks_exact(width).enumerate().filter(|(row, _)| kept(*row)).flat_map(|(_, values)| values.to_vec()).collect()
+    };
+    (holed.time, holed.position, holed.torque) = (of(&whole.time, 1), of(&whole.position, 4), of(&whole.torque, 4));
+    holed.held_out = (0..whole.rows()).filter(|row| kept(*row)).map(|row| whole.held_out[row]).collect();
+    holed.trajectory.truncate(holed.rows());
+    let diagnosis = diagnosed(&holed);
+    assert_eq!(found(&diagnosis), ["coulomb_friction joint 3"]);
+    assert!((number(&diagnosis, "coulomb_friction", "coulomb") / 4.0 - 1.0).abs() < 0.02);
+    assert!(diagnosis.remarks.iter().any(|said| said.contains("steps of the clock without a row")), "{:?}", diagnosis.remarks);
+    let courses = &diagnosis.courses;
+    assert!(courses.row.iter().zip(&courses.time).all(|(row, time)| (holed.time[*row] - time).abs() < 0.03));
 }
 
 #[test]

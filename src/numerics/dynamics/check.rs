@@ -1,6 +1,7 @@
 //! Whether a recording can be used at all: each fault is said with its joint or row and what is allowed.
 
 use super::arm::DynamicArm;
+use super::bridge::Bridged;
 use super::clock::RecordingClock;
 use super::inertials::DeclaredInertials;
 use super::newton_euler::{InverseDynamics, MotionRow};
@@ -233,13 +234,14 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
 }
 
 /// What is odd about a recording that can be used, a sentence each.
-pub(super) fn remarks(recording: &TorqueRecording, clock: &RecordingClock) -> Vec<String> {
+pub(super) fn remarks(bridged: &Bridged, clock: &RecordingClock) -> Vec<String> {
+    let recording = &bridged.recording;
     let mut remarks = Vec::new();
     let usual = 1.0 / clock.rate;
     for stretch in &clock.stretches[1..] {
         let lasted = recording.time[stretch.start] - recording.time[stretch.start - 1];
         let what = if lasted > 1.5 * usual { format!("the clock jumps by {lasted:.3} s") } else { "a joint jumps".into() };
-        remarks.push(format!("row {}: {what}; nothing is filtered across it", stretch.start + 1));
+        remarks.push(format!("row {}: {what}; nothing is filtered across it", bridged.origin[stretch.start] + 1));
     }
     let uneven = recording.time.windows(2).filter(|pair| (pair[1] - pair[0] - usual).abs() > 0.2 * usual).count();
     if uneven > recording.rows() / 20 {

@@ -3,23 +3,33 @@
 mod arm;
 mod base_parameters;
 mod bootstrap;
+mod bridge;
 #[cfg(test)]
 mod cases;
 mod cause;
+mod changes;
 mod check;
 mod choice;
 mod clock;
+mod coefficients;
 mod columns;
+mod consistency;
 mod contact;
+mod cutoff;
 mod derivatives;
 mod errors;
+mod excite;
+mod feed_forward;
 mod filter;
 mod findings;
 mod friction_curve;
+mod inertial_names;
 mod inertials;
 mod judge;
 mod latency;
 mod leftover;
+mod model;
+mod modelled;
 mod newton_euler;
 mod noise;
 mod outcome;
@@ -33,12 +43,20 @@ mod scene;
 mod search;
 mod sign_width;
 mod solve;
+mod stacked;
 mod sweep;
+mod term_names;
 mod types;
 mod unseen;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
+pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
+pub use consistency::{BodyConsistency, inertial_numbers};
+pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
+pub use feed_forward::{NeededTorques, PlannedMotion};
+pub use inertial_names::INERTIAL_NAMES;
+pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use types::{
@@ -47,14 +65,13 @@ pub use types::{
 };
 
 use crate::error::{Error, Result};
+use bridge::Bridged;
 use clock::RecordingClock;
 
 /// What torques that come late are called.
 const LATENCY: &str = "current_latency";
 /// What a push on the arm is called.
 const CONTACT: &str = "contact";
-/// Hz: the cut-off of the low-pass, where nothing else is asked.
-const CUTOFF: f64 = 10.0;
 /// Rows of the longest stretch without a jump, at least.
 const LEAST_STRETCH: usize = 200;
 /// At most this share of the rate.
@@ -72,15 +89,18 @@ pub fn diagnose(
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
     check::check(arm, recording)?;
-    let clock = RecordingClock::of(recording);
+    let bridged = Bridged::of(recording);
+    let clock = RecordingClock::of(&bridged.recording);
     if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
         return Err(Error::data(
             "time",
             format!("the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"),
         ));
     }
-    let remarks = check::remarks(recording, &clock);
-    let cutoff = question.cutoff.unwrap_or(CUTOFF).min(HIGHEST_CUTOFF * clock.rate);
-    let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
-    Ok(outcome::outcome(&solved, question.seed, remarks))
+    let remarks = check::remarks(&bridged, &clock).into_iter().chain(bridged.remark(recording.rows())).collect();
+    let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&bridged.recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
+    let solved = solve::solve(arm, &bridged.recording, question, &clock, cutoff, tell);
+    let mut diagnosis = outcome::outcome(&solved, question.seed, remarks);
+    diagnosis.courses.row.iter_mut().for_each(|row| *row = bridged.origin[*row]);
+    Ok(diagnosis)
 }

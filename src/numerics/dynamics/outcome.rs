@@ -5,6 +5,8 @@ use super::choice::CauseChoice;
 use super::errors::{errors, rests};
 use super::findings::{contact, findings, plain_finding};
 use super::friction_curve::friction_curves;
+use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
+use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -76,6 +78,7 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
         courses: courses(problem, &first, &last),
         inertials: inertials(problem, set, &sweep, &solution),
         friction: friction_curves(problem, set, &sweep),
+        model: TorqueModel::of(&choice, set, &sweep, &solution),
     }
 }
 
@@ -174,19 +177,6 @@ fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> To
 }
 
 fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
-    const NAMES: [&str; INERTIAL_NUMBERS] = [
-        "mass",
-        "moment_x",
-        "moment_y",
-        "moment_z",
-        "inertia_xx",
-        "inertia_xy",
-        "inertia_xz",
-        "inertia_yy",
-        "inertia_yz",
-        "inertia_zz",
-    ];
-    const UNITS: [&str; 3] = ["kg", "kg m", "kg m2"];
     let theta = problem.inertials(set, solution);
     let mut estimates = Vec::new();
     for link in 0..problem.joints() {
@@ -204,8 +194,8 @@ fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solut
                 (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
             estimates.push(InertialEstimate {
                 link,
-                quantity: NAMES[number],
-                unit: UNITS[usize::from(number > 0) + usize::from(number > 3)],
+                quantity: INERTIAL_NAMES[number],
+                unit: inertial_unit(number),
                 value: theta[INERTIAL_NUMBERS * link + number],
                 declared,
                 sigma: variance.max(0.0).sqrt(),

@@ -1,5 +1,6 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
+use super::model::TorqueModel;
 use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
 
@@ -8,7 +9,8 @@ use crate::effect::Place;
 pub struct TorqueQuestion {
     /// Whether masses are identified without regard to what is declared.
     pub free_inertials: bool,
-    /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from the rate of the recording.
+    /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from how fast the joints come
+    /// and go.
     pub cutoff: Option<f64>,
     /// Names of causes that are not tried.
     pub without: Vec<String>,
@@ -233,4 +235,6 @@ pub struct TorqueDiagnosis {
     pub inertials: Vec<InertialEstimate>,
     /// Of joints with friction found.
     pub friction: Vec<FrictionCurve>,
+    /// All that was identified, as torques are predicted with it.
+    pub model: TorqueModel,
 }

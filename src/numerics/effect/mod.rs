@@ -23,7 +23,7 @@ mod gear_cyclic;
 mod gear_flank;
 mod gear_load;
 mod gear_motor_cyclic;
-mod heredity;
+mod instrument_laws;
 mod interactions;
 mod joint_compliance;
 mod joint_hardening;
@@ -41,9 +41,9 @@ mod payload_error;
 mod place;
 mod placed_row;
 mod presliding;
+mod products;
 mod reduction_ratio;
 mod sight;
-mod sighted;
 mod skeleton;
 mod spring;
 mod stack;
@@ -80,9 +80,9 @@ pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclarat
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
-pub use heredity::{follows, is_named_product, products};
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::JointHardening;
+pub use products::{follows, is_named_product, products};
 
 pub use joint_log_lag::JointLogLag;
 pub use joint_table::JointTable;
@@ -184,6 +184,11 @@ impl<'a> ArmState<'a> {
     /// C, where recorded.
     pub fn temperature(&self) -> Option<f64> {
         self.data.temperature(self.row)
+    }
+
+    /// A recorded circumstance, of a joint or of the whole row, SI.
+    pub fn circumstance(&self, column: &str, joint: Option<usize>) -> Option<f64> {
+        self.data.circumstance(column, self.row, joint)
     }
 
     /// Declared payload, kg.

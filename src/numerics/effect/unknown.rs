@@ -1,18 +1,21 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
+mod words;
+
 use super::basis::around;
+use super::instrument_laws;
 use super::joint_table::PLAUSIBLE;
 use super::motion::{SHORT, extent};
 use super::orders;
-use super::sighted;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
-    Variable, figure, warmth,
+    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
+    Variable, warmth,
 };
 use super::{frames, interactions};
 use crate::robot::RobotModel;
 use crate::units::Unit;
+use words::in_words;
 
 /// Structure of no law of the list.
 pub struct Unknown;
@@ -159,7 +162,7 @@ impl Cause for Unknown {
         for (motion, law, tried, penalty) in frames::laws(survey) {
             add(motion, law, tried, penalty);
         }
-        for (of, law, tried, penalty) in sighted::laws(survey, &SWAYS) {
+        for (of, law, tried, penalty) in instrument_laws::laws(survey, &SWAYS) {
             add(Motion::Instrument { of }, law, tried, penalty);
         }
         if survey.payload_changes() {
@@ -350,59 +353,4 @@ pub(super) fn described(summary: &Summary) -> Option<String> {
     // A joint that slides errs by a length.
     let slides = matches!(term.motion(), Motion::Joint { .. }) && numbers.first().is_some_and(|number| number.unit == "mm");
     Some(in_words(term, slides, summary.clock))
-}
-
-/// A position or width of a joint.
-fn position(q: f64, slides: bool) -> String {
-    if slides { format!("{} mm", figure(1e3 * q, 0)) } else { format!("{:.1} deg", q.to_degrees()) }
-}
-
-fn in_words(term: &Term, slides: bool, clock: Clock) -> String {
-    let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
-    let of = variables.join(" and ");
-    if let Motion::Instrument { of: read } = term.motion() {
-        let read = match read {
-            Polar::Azimuth => "azimuths",
-            Polar::Elevation => "elevations",
-            Polar::Range => "ranges",
-        };
-        return match term.basis() {
-            Basis::Sway { period } => format!("its {read} swing slowly with a period of {}", clock.span(period)),
-            _ => format!("its {read} err with the {of}"),
-        };
-    }
-    let over = if clock == Clock::Rows { "over the recording's rows" } else { "with time" };
-    match (term.basis(), term.law().first.of) {
-        (Basis::Bump { centre, width }, _) => {
-            format!("local bump at {}, width {}", position(centre, slides), position(width, slides))
-        }
-        (Basis::Rise { centre, width }, _) => {
-            format!("step at {} within {}", position(centre, slides), position(width, slides))
-        }
-        (Basis::Hinge { from, upwards }, _) => {
-            let side = if upwards { "above" } else { "below" };
-            format!("grows with {of} {side} {}, nothing on the other side", position(from, slides))
-        }
-        (Basis::Wave { .. }, _) if term.law().times.is_some() => format!("product of functions of {of}"),
-        (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),
-        (Basis::Sway { period }, _) => {
-            let turns = term.motion() == Motion::Base { axes: Axes::Rotation };
-            format!("{} slowly with a period of {}", if turns { "rocks" } else { "sways" }, clock.span(period))
-        }
-        (Basis::Creep { exponent, .. }, _) if (exponent - 1.0).abs() < 0.3 => format!("creeps steadily {over}"),
-        (Basis::Creep { exponent, .. }, _) => {
-            format!("creeps {over}, {} and {0}", if exponent > 1.0 { "faster" } else { "slower" })
-        }
-        (Basis::Sign, Variable::Gravity { axis }) => {
-            let name = ["x", "y", "z"].get(axis.unwrap_or(2)).unwrap_or(&"z");
-            format!("differs by which side of its {name} points down, as when a seat has play")
-        }
-        (_, Variable::Gravity { .. }) => "depends on the direction of gravity, as when a mounting yields".into(),
-        (Basis::Settling { .. }, _) | (_, Variable::Temperature | Variable::Lagging { .. }) => match term.law().times {
-            Some(times) => format!("depends on the warm-up and on {}", clock.named(times.of)),
-            None => "depends on the warm-up".into(),
-        },
-        (_, Variable::Payload) => "differs with the payload".into(),
-        _ => format!("function of {of}"),
-    }
 }

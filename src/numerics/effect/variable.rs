@@ -1,7 +1,7 @@
 //! What a row of a recording offers that an error may depend on.
 
 use super::ArmState;
-use crate::robot::{Memory, RobotModel};
+use crate::robot::{CircumstanceName, Memory, RobotModel};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -63,6 +63,13 @@ pub enum Variable {
     Temperature,
     /// s; the number of the row where the recording has no clock.
     Time,
+    /// A circumstance that the recording declares and laws read by name, SI.
+    Circumstance {
+        /// Its setting.
+        column: CircumstanceName,
+        /// From 0; none of one that the whole row has.
+        joint: Option<usize>,
+    },
     /// Moments of all that the arm carries: of effects that are no law of one scalar.
     ArmLoad,
     /// What each joint moved from the row before.
@@ -141,6 +148,7 @@ impl Variable {
             Self::Gravity { axis } => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(component)]),
             Self::Temperature => state.temperature(),
             Self::Time => Some(state.time()),
+            Self::Circumstance { column, joint } => state.circumstance(column.text(), joint),
             Self::Azimuth => Some(state.sight().azimuth),
             Self::Elevation => Some(state.sight().elevation),
             Self::Range => Some(state.sight().range),
@@ -186,6 +194,8 @@ impl fmt::Display for Variable {
             Self::Gravity { .. } => f.write_str("direction of gravity"),
             Self::Temperature => f.write_str("temperature"),
             Self::Time => f.write_str("time"),
+            Self::Circumstance { column, joint: None } => f.write_str(column.text()),
+            Self::Circumstance { column, joint: Some(joint) } => write!(f, "{} of joint {}", column.text(), joint + 1),
             Self::ArmLoad => f.write_str("load of the arm"),
             Self::LastMove => f.write_str("last move"),
             Self::Speed => f.write_str("speed"),

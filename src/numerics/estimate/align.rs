@@ -2,6 +2,7 @@
 //!
 //! It starts from the three points that leave the smallest median error, so that nearly half of the points may be wrong.
 
+use crate::observation::KINDS;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::statistics::nearest;
@@ -14,11 +15,13 @@ const TRIPLES: usize = 60;
 /// Points that judge a triple.
 const JUDGES: usize = 500;
 
-/// Returns the pose of the base in the tracker's frame, from whole points in `rows`. Fewer than three give the identity.
+/// Returns the pose of the base in the tracker's frame, from whole points in `rows`; of fewer than three as another kind of measurement
+/// has it, else the identity.
 pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
+    let all = rows;
     let rows: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
     if rows.len() < 3 {
-        return Pose::identity();
+        return KINDS.iter().find_map(|kind| kind.base(robot, data, all)).unwrap_or_else(Pose::identity);
     }
     let seat = |row: usize| robot.seat(robot.setup().target(data.target(row)));
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();

@@ -80,6 +80,12 @@ impl Covariance {
         (0..self.free.len()).map(|k| dot(derivatives, self.root.column(k)).powi(2)).sum()
     }
 
+    /// The same where only some parameters, by their rows, have an effect.
+    pub(crate) fn along_rows(&self, derivatives: &[f64], rows: &[usize]) -> f64 {
+        let by_column = |k: usize| rows.iter().map(|row| derivatives[*row] * self.root.at(*row, k)).sum::<f64>().powi(2);
+        (0..self.free.len()).map(by_column).sum()
+    }
+
     /// Standard deviation of the `row`-th free parameter, SI.
     pub(crate) fn sigma(&self, row: usize) -> f64 {
         self.product(row, row).sqrt()

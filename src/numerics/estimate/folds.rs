@@ -7,8 +7,8 @@
 
 use super::error_scale::ErrorScale;
 use super::fit::{FitOptions, ParameterStatus, fit};
+use super::fold_factors::NearbyFits;
 use super::left_out::without_places;
-use super::nearby::NearbyFits;
 use super::repeats::Poses;
 use super::session::Session;
 use crate::observation::kinds;

@@ -35,7 +35,7 @@ static ABOUT: KindDescription = KindDescription {
             .as_part(Part::Anchor),
     ],
     own_sigma: true,
-    rank: Rank { places: true, rotations: false, blind: [3, 3] },
+    rank: Rank { places: true, rotations: false, scale: true, blind: [3, 3] },
     is_screened: false,
 };
 

@@ -39,7 +39,7 @@ static ABOUT: KindDescription = KindDescription {
             .as_part(Part::Sigma),
     ],
     own_sigma: true,
-    rank: Rank { places: false, rotations: true, blind: [3, 1] },
+    rank: Rank { places: false, rotations: true, scale: true, blind: [3, 1] },
     is_screened: false,
 };
 

@@ -3,10 +3,10 @@
 //! A kind predicts from where the target is: its derivative by a parameter is a linear map of how the parameter moves the point, turns
 //! the target or moves the vector from the anchor (a [`Sensitivity`]), which the effect stack says of every parameter.
 
-mod column;
 mod distance;
 mod inclination;
 mod orientation;
+mod planar;
 mod plane;
 mod point;
 mod residual;
@@ -14,10 +14,11 @@ mod socket;
 mod sphere;
 mod weight;
 
-pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
+pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
 pub use orientation::Orientation;
+pub use planar::Planar;
 pub use plane::PlaneKind;
 pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual};
@@ -34,7 +35,7 @@ use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
 pub const KINDS: &[&dyn MeasurementKind] =
-    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind];
+    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind, &Planar];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +84,8 @@ pub struct Rank {
     pub places: bool,
     /// Whether it sees how targets are turned.
     pub rotations: bool,
+    /// Whether it sees how large the arm is: a length was measured, or is known.
+    pub scale: bool,
     /// Translations and rotations of the whole cell that it does not see.
     pub blind: [usize; 2],
 }
@@ -197,6 +200,11 @@ pub trait MeasurementKind: Sync {
         None
     }
 
+    /// For a start where no whole points are: where the base stands, in the recording's frame.
+    fn base(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize]) -> Option<Pose> {
+        None
+    }
+
     /// For a start: where anchors are. Fails with a sentence where too little was measured from one.
     fn anchors(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize], _base: &Pose) -> Result<Vec<Anchor>, String> {
         Ok(Vec::new())
@@ -282,7 +290,7 @@ const ALONG: f64 = 0.9999;
 /// Parameters of the geometry that the rows see by theory; none where some saw axes of a point only, of which theory has no word.
 ///
 /// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor (4 for a
-/// sphere); less what moves the whole cell unseen, and its scale where targets are only brought to things and no `length` is known. Sockets
+/// sphere); less what moves the whole cell unseen, and its scale where no kind sees it and no `length` is known. Sockets
 /// whose place is known, `points` of them on no line, fix the cell: one its translations, two the scale and all turns but about their line.
 pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool, points: usize) -> Option<usize> {
     let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
@@ -319,6 +327,8 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: boo
     };
     let flat = used.iter().all(|kind| kind.about().name == PlaneKind.about().name) && setup.anchors.iter().all(along_first);
     let unplaced = if flat && robot.is_revolute(0) && points == 0 { 2 } else { 0 };
-    let scale = usize::from(used.iter().all(|kind| kind.is_brought()) && !length && points < 2);
+    // The travel of a slide is a length.
+    let slides = (0..robot.joints()).any(|joint| !robot.is_revolute(joint));
+    let scale = usize::from(used.iter().all(|kind| !kind.about().rank.scale) && !length && !slides && points < 2);
     Some(seen - scale - unplaced - if places { translations } else { 0 } - rotations)
 }

@@ -95,7 +95,7 @@ static ABOUT: KindDescription = KindDescription {
         .as_part(Part::Sigma),
     ],
     own_sigma: true,
-    rank: Rank { places: false, rotations: true, blind: [3, 0] },
+    rank: Rank { places: false, rotations: true, scale: true, blind: [3, 0] },
     is_screened: false,
 };
 

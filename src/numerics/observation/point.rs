@@ -59,7 +59,7 @@ static ABOUT: KindDescription = KindDescription {
         DeclaredColumn::uncertainty("u_z", &["sigma_z"], 1.0, "Standard uncertainty of z.").together(STANDARD),
     ],
     own_sigma: false,
-    rank: Rank { places: true, rotations: false, blind: [0, 0] },
+    rank: Rank { places: true, rotations: false, scale: true, blind: [0, 0] },
     is_screened: true,
 };
 

@@ -30,7 +30,7 @@ static ABOUT: KindDescription = KindDescription {
         .as_part(Part::Sigma),
     ],
     own_sigma: true,
-    rank: Rank { places: true, rotations: false, blind: [3, 3] },
+    rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
     is_screened: false,
 };
 

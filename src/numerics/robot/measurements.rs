@@ -27,6 +27,8 @@ pub struct Measurements {
     pub time: Option<Vec<f64>>,
     /// Of the arm, C.
     pub temperature: Option<Vec<f64>>,
+    /// Circumstances that declared laws read by name, SI: one number a row, or one for each joint.
+    pub circumstances: BTreeMap<&'static str, Vec<f64>>,
     /// Direction of the last move of each joint, +1 / -1; without it the order of the rows tells.
     pub direction: Option<Vec<f64>>,
     /// Velocity of each joint when the point was measured, rad/s or m/s; without it the arm stood.
@@ -90,6 +92,15 @@ impl Measurements {
         nearest(self.temperature.as_ref()?, row)
     }
 
+    /// A circumstance (SI) of a joint, from 0, or of the whole row: that of the last row that has one where this row has none.
+    pub fn circumstance(&self, column: &str, row: usize, joint: Option<usize>) -> Option<f64> {
+        let all = self.circumstances.get(column)?;
+        match joint {
+            None => nearest(all, row),
+            Some(joint) => all.get(row * self.joints + joint).copied().filter(|value| value.is_finite()),
+        }
+    }
+
     /// The row that was measured at a place, from 0, of the order of measurement.
     pub fn at_place(&self, place: usize) -> usize {
         self.sequence.as_ref().map_or(place, |sequence| sequence.row(place))
@@ -120,14 +131,14 @@ impl Measurements {
     }
 
     /// The last row of the stop before that of a row, and the first row of its own; none at the first stop.
-    pub fn way(&self, row: usize) -> Option<[usize; 2]> {
+    pub fn preceding_move(&self, row: usize) -> Option<[usize; 2]> {
         let first = self.stop(row);
         Some([self.at_place(self.place(first).checked_sub(1)?), first])
     }
 
     /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
     pub fn last_move(&self, row: usize, joint: usize) -> f64 {
-        self.way(row).map_or(0.0, |[from, to]| self.q(to)[joint] - self.q(from)[joint])
+        self.preceding_move(row).map_or(0.0, |[from, to]| self.q(to)[joint] - self.q(from)[joint])
     }
 
     /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of measurement; 0 if it never moved.

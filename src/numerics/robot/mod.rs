@@ -1,6 +1,8 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
 mod bound;
+mod circumstances;
+mod column;
 pub mod import;
 mod instrument;
 mod joint_convention;
@@ -19,6 +21,8 @@ mod travel;
 mod visited;
 
 pub use bound::{Bound, ONE_AND_A_HALF_TURNS};
+pub use circumstances::{CIRCUMSTANCES, CircumstanceName, law_columns};
+pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};

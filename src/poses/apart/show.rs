@@ -3,7 +3,7 @@
 use super::Apart;
 use crate::diagnose::other_means;
 use crate::error::counted;
-use crate::estimate::choose::{Discrimination, TOLD};
+use crate::estimate::choose::{Discrimination, MIN_SEPARATION_L};
 use crate::poses::show::closing;
 use crate::poses::{Drive, PoseAnswer, drive};
 use serde_json::{Value, json};
@@ -39,11 +39,11 @@ impl Apart<'_> {
         // What can show at all must.
         let least = |l: &[f64; 2]| (0..2).filter(|k| !alike[*k]).map(|k| l[k]).fold(f64::INFINITY, f64::min);
         let (was, will, count) = (least(before), least(&proposed.after), proposed.poses.rows());
-        if will >= TOLD {
-            let already = if was >= TOLD { "; the recording alone should do" } else { "" };
+        if will >= MIN_SEPARATION_L {
+            let already = if was >= MIN_SEPARATION_L { "; the recording alone should do" } else { "" };
             out.push(format!("measured at {}, they are separable{already}", counted(count, "pose")));
         } else {
-            let needed = ((TOLD - was) / (will - was) * count as f64).ceil();
+            let needed = ((MIN_SEPARATION_L - was) / (will - was) * count as f64).ceil();
             let more =
                 if needed < MOST { format!("some {needed:.0} such poses would") } else { "no number of poses would".into() };
             let size = if alike.contains(&true) { ", if the effect is as large as this recording estimates" } else { "" };
@@ -65,7 +65,7 @@ impl PoseAnswer for Apart<'_> {
         let names = self.names();
         let mut text = format!("finding {}: {}\nrival: {}\n", self.finding.rank, self.finding.statement, names[1]);
         text.push_str(&format!(
-            "\nexpected separation L: squared residual over noise variance when the other is fitted in its place; below {TOLD} they\n\
+            "\nexpected separation L: squared residual over noise variance when the other is fitted in its place; below {MIN_SEPARATION_L} they\n\
              cannot be separated. Points good to {:.3} mm per axis\n",
             self.sigma
         ));
@@ -118,7 +118,7 @@ impl PoseAnswer for Apart<'_> {
             "sigma_mm": self.sigma,
             "temperature_c": self.circumstances.temperature,
             "points": self.rows,
-            "told_from": TOLD,
+            "told_from": MIN_SEPARATION_L,
             "separation": separation,
             "conclusion": self.conclusion(),
             "approach_visible_share": proposed.as_ref().map(|proposed| proposed.approach_seen),

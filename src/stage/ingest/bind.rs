@@ -288,8 +288,8 @@ impl Binder<'_> {
     }
     /// A cell that may not be blank.
     fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
-        let (quantity, range) = declared.of_joint(is_prismatic);
-        let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
+        let (_, range) = declared.of_joint(is_prismatic);
+        let (is_direction, name) = (declared.setting == "direction", self.name(column));
         let (optional, divisor, zero, sign, difference, is_clock) = (false, 1.0, 0.0, 1.0, None, false);
         NumberBinding { index, column, unit, range, is_direction, optional, divisor, zero, sign, name, difference, is_clock }
     }

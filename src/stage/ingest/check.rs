@@ -5,7 +5,8 @@ use super::clock::CLOCK;
 use super::columns::Columns;
 use super::later;
 use super::layout::{Duplicates, FileLayout, Join};
-use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
+use super::lines::delimiter;
+use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
 use super::noise;
 use super::{Ingest, twice};
 use crate::error::{Fault, counted, nearest};
@@ -60,21 +61,7 @@ pub(super) fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault
         faults.push(Fault::new(format!("{place}.columns"), "no quantity is mapped"));
     }
     for (declared, text) in columns.texts() {
-        let place = format!("{place}.columns.{}", declared.setting);
-        if text.path.is_some() {
-            faults.push(Fault::new(format!("{place}.path"), "is filled in where a pipeline's file is read; here say `value`"));
-        } else {
-            one_of(text.column.is_some(), text.value.is_some(), "`column`, `value` or `path`", &place, faults);
-        }
-        if declared.setting == "point_id" && text.value.is_some() {
-            faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
-        }
-        for (key, given) in [("match", text.matching.is_some()), ("strip", text.strip.is_some())] {
-            if given && declared.setting != "point_id" {
-                faults.push(Fault::new(format!("{place}.{key}"), "a rule for names of points; allowed for `point_id` alone"));
-            }
-        }
-        column(text.column.as_ref(), file, &place, faults);
+        text_faults(declared, text, file, &format!("{place}.columns.{}", declared.setting), faults);
     }
     for (declared, counted) in columns.counts() {
         column(Some(&counted.column), file, &format!("{place}.columns.{}", declared.setting), faults);
@@ -114,6 +101,23 @@ pub(super) fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault
             faults.push(Fault::new(format!("{place}.columns"), message));
         }
     }
+}
+
+fn text_faults(declared: &DeclaredColumn, text: &TextColumn, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    if text.path.is_some() {
+        faults.push(Fault::new(format!("{place}.path"), "is filled in where a pipeline's file is read; here say `value`"));
+    } else {
+        one_of(text.column.is_some(), text.value.is_some(), "`column`, `value` or `path`", place, faults);
+    }
+    if declared.setting == "point_id" && text.value.is_some() {
+        faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
+    }
+    for (key, given) in [("match", text.matching.is_some()), ("strip", text.strip.is_some())] {
+        if given && declared.setting != "point_id" {
+            faults.push(Fault::new(format!("{place}.{key}"), "a rule for names of points; allowed for `point_id` alone"));
+        }
+    }
+    column(text.column.as_ref(), file, place, faults);
 }
 
 /// A distance of nought has no direction.
@@ -277,6 +281,7 @@ fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<
     let clock = if quantity == Quantity::Time { ", or clock for times such as 08:15:03 and 2026-11-22T08:15:03" } else { "" };
     let list = allowed.join(", ") + clock;
     match symbol {
+        None if quantity == Quantity::Number => {}
         None => faults.push(Fault::new(place, format!("no unit; allowed: {list}"))),
         Some(symbol) => match Unit::parse(symbol) {
             Some(unit) if unit.quantity() == quantity => {}
@@ -378,26 +383,5 @@ fn complete(files: &[FileLayout], needed: &[&str], place: &str, faults: &mut Vec
     let missing: Vec<&str> = needed.iter().copied().filter(|name| !mapped.contains(name)).collect();
     if !missing.is_empty() {
         faults.push(Fault::new(place, format!("not mapped: {}", missing.join(", "))));
-    }
-}
-
-/// What separates fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Delimiter {
-    Byte(u8),
-    Whitespace,
-}
-
-/// The delimiter that a person wrote, or `None` for what is not allowed.
-pub(super) fn delimiter(text: &str) -> Option<Delimiter> {
-    match (text, text.as_bytes()) {
-        ("tab", _) => Some(Delimiter::Byte(b'\t')),
-        ("whitespace", _) => Some(Delimiter::Whitespace),
-        (_, [byte])
-            if byte.is_ascii() && !byte.is_ascii_alphanumeric() && !matches!(byte, b'"' | b'\n' | b'\r' | b'.' | b'-' | b'+') =>
-        {
-            Some(Delimiter::Byte(*byte))
-        }
-        _ => None,
     }
 }

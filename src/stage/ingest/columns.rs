@@ -103,6 +103,17 @@ impl Columns {
         self.0.iter().map(|(column, _)| column.setting).collect()
     }
 
+    /// The same with another target in every row, where one is mapped.
+    pub(super) fn of_target(&self, name: &str) -> Self {
+        let of = |(column, mapped): &(&'static DeclaredColumn, Mapped)| match mapped {
+            Mapped::Text(text) if column.setting == "target" => {
+                (*column, Mapped::Text(TextColumn { column: None, path: None, value: Some(name.into()), ..text.clone() }))
+            }
+            other => (*column, other.clone()),
+        };
+        Self(self.0.iter().map(of).collect())
+    }
+
     /// What does not depend on the robot's joints.
     pub(super) fn without_joints(&self) -> Self {
         let others = self.0.iter().filter(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));

@@ -9,7 +9,7 @@ use crate::error::{Error, Fault, Result, counted};
 struct ReadFile<'a> {
     place: String,
     scan: &'a Scan,
-    fate: &'a FileDecision,
+    decision: &'a FileDecision,
 }
 
 /// Fails where the same measured rows would be used twice. One log of several days beside a file of joints for each day is none: of its
@@ -17,13 +17,13 @@ struct ReadFile<'a> {
 pub(super) fn refuse(scanned: &[(Vec<Scan>, Vec<FileDecision>)]) -> Result<()> {
     let mut read: Vec<ReadFile> = Vec::new();
     let mut faults = Vec::new();
-    for (set, (scans, fates)) in scanned.iter().enumerate() {
-        for (index, (scan, fate)) in scans.iter().zip(fates).enumerate() {
+    for (set, (scans, decisions)) in scanned.iter().enumerate() {
+        for (index, (scan, decision)) in scans.iter().zip(decisions).enumerate() {
             let place = match set.checked_sub(1) {
                 None => format!("files[{index}].file"),
                 Some(later) => format!("later[{later}].files[{index}]"),
             };
-            let own = ReadFile { place, scan, fate };
+            let own = ReadFile { place, scan, decision };
             let found = read.iter().find_map(|other| Some((other, shared(other, &own).filter(|rows| *rows > 0)?)));
             if let Some((other, rows)) = found {
                 let message = format!(
@@ -47,9 +47,9 @@ fn shared(one: &ReadFile, other: &ReadFile) -> Option<u64> {
     if one.scan.measured? != other.scan.measured? {
         return None;
     }
-    if one.fate.partners.is_empty() || other.fate.partners.is_empty() {
-        return Some(accepted(one.scan, one.fate).min(accepted(other.scan, other.fate)));
+    if one.decision.partners.is_empty() || other.decision.partners.is_empty() {
+        return Some(accepted(one.scan, one.decision).min(accepted(other.scan, other.decision)));
     }
-    let both = |number: &usize| one.fate.is_whole(*number) && other.fate.is_whole(*number);
+    let both = |number: &usize| one.decision.is_whole(*number) && other.decision.is_whole(*number);
     Some((1..=one.scan.read as usize).filter(both).count() as u64)
 }

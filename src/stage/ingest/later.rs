@@ -17,6 +17,17 @@ pub struct LaterFiles {
     /// Where the clock of these files starts again: from the last row before to their first one, s.
     #[serde(default = "hour")]
     pub gap_s: f64,
+    /// The target that these files measured, where several reflectors were measured in the same poses, each into a file: it stands for
+    /// the `target` of `files`. A file of joints may then be the same, and rows keep their times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
+}
+
+impl LaterFiles {
+    /// What their first row comes after the last one by, s; none where they were measured together with those before.
+    pub(super) fn gap(&self) -> Option<f64> {
+        self.target.is_none().then_some(self.gap_s)
+    }
 }
 
 fn hour() -> f64 {
@@ -28,7 +39,12 @@ impl Ingest {
     pub(super) fn measurements(&self) -> Vec<Self> {
         let later = self.later.iter().map(|later| {
             let layouts = self.files.iter().zip(&later.files);
-            let files = layouts.map(|(layout, file)| FileLayout { file: file.clone(), ..layout.clone() });
+            let columns = |layout: &FileLayout| match &later.target {
+                Some(target) => layout.columns.of_target(target),
+                None => layout.columns.clone(),
+            };
+            let files =
+                layouts.map(|(layout, file)| FileLayout { file: file.clone(), columns: columns(layout), ..layout.clone() });
             Self { files: files.collect(), later: Vec::new(), ..self.clone() }
         });
         std::iter::once(Self { later: Vec::new(), ..self.clone() }).chain(later).collect()
@@ -69,7 +85,12 @@ pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
             Fault::new(format!("{place}.files"), message)
         });
         let gap = !(later.gap_s >= 0.0 && later.gap_s.is_finite());
-        files.into_iter().chain(again).chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
+        let named = |layout: &FileLayout| layout.columns.text("target").is_some_and(|text| text.value.is_some());
+        let target = (later.target.is_some() && !settings.files.iter().any(named)).then(|| {
+            let message = "the reflector of `files` has no name; say it there, e.g. `columns: {target: {value: A}, ..}`";
+            Fault::new(format!("{place}.target"), message)
+        });
+        files.into_iter().chain(again).chain(target).chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
     })
 }
 
@@ -79,7 +100,7 @@ pub(super) struct Continuation {
     last: Option<i64>,
     latest: f64,
     /// Of a later measurement before its first row, what its first row comes after the last one by, s.
-    begun: Option<f64>,
+    begun: Option<Option<f64>>,
     sequence_by: i64,
     time_by: f64,
 }
@@ -91,8 +112,8 @@ impl Default for Continuation {
 }
 
 impl Continuation {
-    /// Before the first row of a later measurement.
-    pub fn begin(&mut self, gap_s: f64) {
+    /// Before the first row of a later measurement; without a gap its clock is that of the rows before.
+    pub fn begin(&mut self, gap_s: Option<f64>) {
         (self.begun, self.sequence_by, self.time_by) = (Some(gap_s), 0, 0.0);
     }
 
@@ -101,7 +122,7 @@ impl Continuation {
     pub fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
         if let Some(gap) = self.begun.take() {
             self.sequence_by = self.last.filter(|last| sequence <= *last).map_or(0, |last| last.saturating_sub(sequence - 1));
-            if time <= self.latest {
+            if let Some(gap) = gap.filter(|_| time <= self.latest) {
                 self.time_by = self.latest + gap - time;
             }
         }
@@ -124,12 +145,17 @@ mod tests {
         assert_eq!(rows.next(1, 10.0), Ok((1, 10.0)));
         assert_eq!(rows.next(2, 20.0), Ok((2, 20.0)));
         assert_eq!(rows.next(2, 30.0), Err((2, 2)));
-        rows.begin(100.0);
+        rows.begin(Some(100.0));
         assert_eq!(rows.next(1, 5.0), Ok((3, 130.0)));
         assert_eq!(rows.next(2, 6.0), Ok((4, 131.0)));
-        rows.begin(100.0);
+        rows.begin(Some(100.0));
         assert_eq!(rows.next(9, 500.0), Ok((9, 500.0)));
-        rows.begin(0.0);
+        rows.begin(Some(0.0));
+        // What was measured at the same poses has the same times.
+        let mut together = Continuation::default();
+        assert_eq!(together.next(1, 10.0), Ok((1, 10.0)));
+        together.begin(None);
+        assert_eq!(together.next(1, 10.0), Ok((2, 10.0)));
         assert!(rows.next(1, f64::NAN).is_ok_and(|(sequence, time)| sequence == 10 && time.is_nan()));
     }
 }

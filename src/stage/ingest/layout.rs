@@ -8,12 +8,12 @@ use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One raw file: delimited text, or Parquet.
+/// One raw file: delimited text, a workbook, or a file of columns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
     /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
-    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a flat Parquet file, for which only `columns` matters.
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a flat file of columns (Parquet; Feather uncompressed or by zstd), for which only `columns` matters.
     pub file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]

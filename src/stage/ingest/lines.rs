@@ -2,75 +2,60 @@
 //!
 //! A quoted field may hold the delimiter, line ends and `""` for a quote. Empty lines and comments are no rows.
 
-use super::check::{Delimiter, delimiter};
 use super::encoding;
 use super::layout::FileLayout;
+use super::record::{BUFFER, Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Result};
+use crate::raw::{Utf16Reader, is_utf16};
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 
 /// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
 const LONGEST: usize = 1 << 20;
 
-pub(super) type Buffered = BufReader<Box<dyn Read + Send>>;
+/// What no other kind of file is.
+pub(super) const FORMAT: FileFormat = FileFormat { is: |_, _| true, has_sheets: false, open };
+
+fn open(mut source: Buffered, label: &str, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+    if is_utf16(source.fill_buf().map_err(|error| failed(label, &error))?) {
+        let text: Box<dyn Read + Send> = Box::new(Utf16Reader::new(source));
+        source = BufReader::with_capacity(BUFFER, text);
+    }
+    Ok(Box::new(TextReader::open(source, label, layout)?))
+}
+
+/// What separates fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Delimiter {
+    Byte(u8),
+    Whitespace,
+}
+
+/// The delimiter that a person wrote, or `None` for what is not allowed.
+pub(super) fn delimiter(text: &str) -> Option<Delimiter> {
+    match (text, text.as_bytes()) {
+        ("tab", _) => Some(Delimiter::Byte(b'\t')),
+        ("whitespace", _) => Some(Delimiter::Whitespace),
+        (_, [byte])
+            if byte.is_ascii() && !byte.is_ascii_alphanumeric() && !matches!(byte, b'"' | b'\n' | b'\r' | b'.' | b'-' | b'+') =>
+        {
+            Some(Delimiter::Byte(*byte))
+        }
+        _ => None,
+    }
+}
 
 /// Reads one file from its first line to its last.
 pub(super) struct TextReader {
     reader: Buffered,
-    pub label: String,
+    label: String,
     delimiter: Delimiter,
     comment: Option<Vec<u8>>,
     /// The next row is the header, and a comment.
     header_in_comment: bool,
     /// Physical lines read so far.
-    pub lines: u64,
-    /// Bytes read so far.
-    pub bytes: u64,
-}
-
-/// One row; reused from row to row.
-#[derive(Default)]
-pub(super) struct RecordFields {
-    /// Line where it begins, from 1.
-    pub line: u64,
-    /// The bytes as they stand, without the line end.
-    text: Vec<u8>,
-    unquoted: Vec<u8>,
-    quoted: bool,
-    fields: Vec<Range<usize>>,
-}
-
-impl RecordFields {
-    /// Starts a row whose fields are pushed one by one.
-    pub(super) fn begin(&mut self, line: u64) {
-        self.line = line;
-        self.text.clear();
-        self.fields.clear();
-        self.quoted = false;
-    }
-    pub(super) fn push(&mut self, field: &[u8]) {
-        if !self.fields.is_empty() {
-            self.text.push(b',');
-        }
-        let start = self.text.len();
-        self.text.extend_from_slice(field);
-        self.fields.push(start..self.text.len());
-    }
-    pub(super) fn len(&self) -> usize {
-        self.fields.len()
-    }
-    /// A field without the blanks around it.
-    pub(super) fn field(&self, index: usize) -> Option<&[u8]> {
-        let bytes = if self.quoted { &self.unquoted } else { &self.text };
-        self.fields.get(index).and_then(|range| bytes.get(range.clone())).map(<[u8]>::trim_ascii)
-    }
-    pub(super) fn is_blank(&self, from: usize) -> bool {
-        (from..self.len()).all(|index| self.field(index).is_some_and(<[u8]>::is_empty))
-    }
-    /// The row for people, cut at 200 characters.
-    pub(super) fn text(&self) -> String {
-        encoding::shown(&self.text).chars().take(200).collect()
-    }
+    lines: u64,
+    bytes: u64,
 }
 
 impl TextReader {
@@ -81,7 +66,7 @@ impl TextReader {
         let header_in_comment = layout.header_in_comment;
         let mut lines = Self { reader, label: label.into(), delimiter, comment, header_in_comment, lines: 0, bytes: 0 };
         lines.byte_order_mark()?;
-        lines.skip(layout.skip)?;
+        lines.pass(layout.skip)?;
         Ok(lines)
     }
     fn byte_order_mark(&mut self) -> Result<()> {
@@ -102,8 +87,8 @@ impl TextReader {
         }
         Ok(())
     }
-    /// Skips physical lines.
-    pub(super) fn skip(&mut self, count: u64) -> Result<()> {
+    /// Passes over physical lines.
+    fn pass(&mut self, count: u64) -> Result<()> {
         let mut text = Vec::new();
         for _ in 0..count {
             text.clear();
@@ -151,8 +136,13 @@ impl TextReader {
         record.text.drain(..mark.len());
         Ok(())
     }
-    /// The next row; false at the end of the file.
-    pub(super) fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
+}
+
+impl RecordReader for TextReader {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         loop {
             record.text.clear();
             if !self.line(&mut record.text)? {
@@ -181,10 +171,18 @@ impl TextReader {
             return Ok(true);
         }
     }
-}
-
-pub(super) fn failed(label: &str, error: &std::io::Error) -> Error {
-    Error::store(label, format!("could not be read: {error}"))
+    fn lines(&self) -> u64 {
+        self.lines
+    }
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+    fn is_text(&self) -> bool {
+        true
+    }
+    fn skip(&mut self, lines: u64) -> Result<()> {
+        self.pass(lines)
+    }
 }
 
 /// Fields of a row without quotes.

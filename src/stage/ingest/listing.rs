@@ -1,9 +1,12 @@
 //! Joint positions that a controller's program declares, as the rows of a table: `name`, the six joints, the external axes.
 
-use super::lines::{RecordFields, failed};
+use super::layout::FileLayout;
+use super::record::{Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Fault, Result, counted};
-use crate::program::{JointList, Language, MOST_BYTES, joint_list};
-use std::io::Read;
+use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing};
+use crate::raw;
+use std::io::{BufRead, Read};
+use std::path::Path;
 
 /// Names of the columns: as the languages call the axes.
 const RAPID: [&str; 12] =
@@ -55,38 +58,48 @@ impl ListedTable {
     }
 }
 
+pub(super) const FORMAT: FileFormat = FileFormat { is: |ending, head| listing(ending, head).is_some(), has_sheets: false, open };
+
+fn open(mut source: Buffered, label: &str, _layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+    let head = source.fill_buf().map_err(|error| failed(label, &error))?;
+    let language = listing(&raw::ending(Path::new(label)), head).ok_or_else(|| Error::Bug(format!("{label} is no program")))?;
+    let table = ListedTable::read(source, label, language)?;
+    Ok(Box::new(ListingReader { label: label.into(), table, is_named: false, rows: 0 }))
+}
+
 /// Hands out such a table row by row.
-pub(super) struct ListingReader {
-    pub label: String,
+struct ListingReader {
+    label: String,
     table: ListedTable,
     is_named: bool,
     /// Rows handed out.
-    pub rows: usize,
+    rows: usize,
 }
 
-impl ListingReader {
-    pub(super) fn open(source: impl Read, label: &str, language: Language) -> Result<Self> {
-        Ok(Self { label: label.into(), table: ListedTable::read(source, label, language)?, is_named: false, rows: 0 })
+impl RecordReader for ListingReader {
+    fn label(&self) -> &str {
+        &self.label
     }
-    /// The names of the columns, then row by row; false at the end.
-    pub(super) fn next(&mut self, record: &mut RecordFields) -> bool {
+    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         if !std::mem::replace(&mut self.is_named, true) {
             record.begin(1);
             self.table.names.iter().for_each(|name| record.push(name.as_bytes()));
-            return true;
+            return Ok(true);
         }
-        let Some((line, cells)) = self.table.rows.get(self.rows) else { return false };
+        let Some((line, cells)) = self.table.rows.get(self.rows) else { return Ok(false) };
         self.rows += 1;
         record.begin(*line);
         cells.iter().for_each(|cell| record.push(cell.as_bytes()));
-        true
+        Ok(true)
     }
     /// The line of the last row handed out.
-    pub(super) fn line(&self) -> u64 {
+    fn lines(&self) -> u64 {
         self.rows.checked_sub(1).and_then(|row| self.table.rows.get(row)).map_or(0, |(line, _)| *line)
     }
-    /// What was left out, for the person.
-    pub(super) fn remark(&self) -> Option<String> {
+    fn bytes(&self) -> u64 {
+        self.rows as u64
+    }
+    fn remark(&self) -> Option<String> {
         let poses = self.table.poses;
         (poses > 0).then(|| format!("{} without joints left out", counted(poses, "pose")))
     }

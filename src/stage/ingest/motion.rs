@@ -126,16 +126,16 @@ impl JointSamples {
         let gap = motion.and_then(|motion| motion.gap_s).unwrap_or(GAP * usual);
         let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9).ceil().max(1.0) as usize;
         let mut rates = vec![f64::NAN; rows as usize * 2 * joints];
-        let (mut lonely, mut start) = (0, 0);
+        let (mut isolated, mut start) = (0, 0);
         let (mut squares, mut errors) = (vec![0.0; joints], vec![0.0; joints]);
-        let (mut theirs, mut both) = (vec![0.0; joints], vec![0.0; joints]);
+        let (mut reported, mut both) = (vec![0.0; joints], vec![0.0; joints]);
         while start < self.time.len() {
             let connected =
                 |k: &usize| (0.0..=gap).contains(&(self.time[*k] - self.time[*k - 1])) && self.time[*k] > self.time[*k - 1];
             let end = (start + 1..self.time.len()).take_while(connected).last().unwrap_or(start);
             for i in start..=end {
                 let Some(near) = self.around(i, [start, end], reach) else {
-                    lonely += 1;
+                    isolated += 1;
                     continue;
                 };
                 let far = self.around(i, [start, end], 2 * reach).filter(|far| far[0] < near[0] && far[2] > near[2]);
@@ -150,7 +150,7 @@ impl JointSamples {
                     }
                     let given = self.given.get(i * joints + joint).copied().unwrap_or(f64::NAN);
                     if given.is_finite() {
-                        theirs[joint] += given * given;
+                        reported[joint] += given * given;
                         both[joint] += given * velocity;
                     }
                 }
@@ -168,28 +168,19 @@ impl JointSamples {
         };
         let rough = rough(false).max(rough(true));
         if !given && motion.is_some() {
-            self.tell(rough, usual, gap, lonely, label, context)?;
+            self.tell(rough, usual, gap, isolated, label, context)?;
         } else if rough > TOO_ROUGH {
             rates.fill(f64::NAN);
         } else {
-            for joint in (0..joints).filter(|joint| squares[*joint] > 0.01 * fastest(&squares) && theirs[*joint] > 0.0) {
-                // Least squares either way round: noise in either makes it no larger.
-                let factor = theirs[joint] / both[joint].abs().max(f64::MIN_POSITIVE);
-                let against = both[joint] < 0.0;
-                if against || !(1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&factor) {
-                    let how = if against { "have the opposite sign of".to_string() } else { format!("are {factor:.3} times") };
-                    let message = format!(
-                        "the velocities of joint {} {how} what its positions over time say; state the unit and sign of the file",
-                        joint + 1
-                    );
-                    return Err(Error::data(label, message));
-                }
+            let fast = (0..joints).filter(|joint| squares[*joint] > 0.01 * fastest(&squares) && reported[*joint] > 0.0);
+            for joint in fast {
+                same_unit(joint, reported[joint], both[joint], label)?;
             }
         }
         Ok(Track { joints, rates })
     }
 
-    fn tell(&self, rough: f64, usual: f64, gap: f64, lonely: usize, label: &str, context: &Context) -> Result<()> {
+    fn tell(&self, rough: f64, usual: f64, gap: f64, isolated: usize, label: &str, context: &Context) -> Result<()> {
         let (ms, gap) = (1e3 * usual, 1e3 * gap);
         if rough > TOO_ROUGH {
             let message = format!(
@@ -198,7 +189,7 @@ impl JointSamples {
             );
             return Err(Error::data(label, message));
         }
-        let alone = if lonely > 0 { format!("; none for {} between gaps", counted(lonely, "row")) } else { String::new() };
+        let alone = if isolated > 0 { format!("; none for {} between gaps", counted(isolated, "row")) } else { String::new() };
         context.services.note(format!(
             "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
             100.0 * rough
@@ -211,6 +202,22 @@ impl JointSamples {
         }
         Ok(())
     }
+}
+
+/// Whether the velocities that a file gives a joint have the unit and sign of its positions over time, by their squares and products.
+fn same_unit(joint: usize, reported: f64, both: f64, label: &str) -> Result<()> {
+    // Least squares either way round: noise in either makes it no larger.
+    let factor = reported / both.abs().max(f64::MIN_POSITIVE);
+    let against = both < 0.0;
+    if !against && (1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&factor) {
+        return Ok(());
+    }
+    let how = if against { "have the opposite sign of".to_string() } else { format!("are {factor:.3} times") };
+    let message = format!(
+        "the velocities of joint {} {how} what its positions over time say; state the unit and sign of the file",
+        joint + 1
+    );
+    Err(Error::data(label, message))
 }
 
 impl Track {

@@ -37,7 +37,7 @@ impl FileDecision {
 
 /// Decides for all files. Files that continue each other share their ids.
 pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
-    let mut fates: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
+    let mut decisions: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
     if let Some(Join::Append {}) | None = join {
         let mut keys = Vec::new();
         for scan in scans.iter_mut() {
@@ -47,19 +47,19 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
                 keys.append(&mut scan.keys);
             }
         }
-        single(&mut keys, duplicates, &mut fates);
-        return fates;
+        single(&mut keys, duplicates, &mut decisions);
+        return decisions;
     }
     for scan in scans.iter_mut() {
-        single(&mut scan.keys, duplicates, &mut fates);
+        single(&mut scan.keys, duplicates, &mut decisions);
     }
-    let ([first, others @ ..], [one, fates_of_others @ ..]) = (scans, fates.as_mut_slice()) else { return fates };
-    for (index, (second, other)) in others.iter().zip(fates_of_others.iter()).enumerate() {
+    let ([first, others @ ..], [one, decisions_of_others @ ..]) = (scans, decisions.as_mut_slice()) else { return decisions };
+    for (index, (second, other)) in others.iter().zip(decisions_of_others.iter()).enumerate() {
         let pairs = match join {
             Some(Join::Id {}) => by_id(&first.keys, &second.keys),
             Some(Join::Time { tolerance_s, offset_s }) => {
-                let times = |scan: &Scan, fate: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
-                    let rows = scan.times.iter().filter(|(_, number)| !fate.twins.contains_key(number));
+                let times = |scan: &Scan, decision: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
+                    let rows = scan.times.iter().filter(|(_, number)| !decision.twins.contains_key(number));
                     rows.map(|(time, number)| (time - offset, *number)).collect()
                 };
                 // What comes third was made of the first, and has its clock.
@@ -67,8 +67,8 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
                 by_time(times(first, one, 0.0), times(second, other, offset), *tolerance_s)
             }
             _ => {
-                let usable = |scan: &Scan, fate: &FileDecision, number: u32| {
-                    scan.usable.get(number as usize - 1).copied().unwrap_or(false) && !fate.twins.contains_key(&number)
+                let usable = |scan: &Scan, decision: &FileDecision, number: u32| {
+                    scan.usable.get(number as usize - 1).copied().unwrap_or(false) && !decision.twins.contains_key(&number)
                 };
                 let rows = 1..=first.read.min(second.read) as u32;
                 rows.filter(|n| usable(first, one, *n) && usable(second, other, *n)).map(|n| (n, n)).collect()
@@ -80,18 +80,18 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
         }
         one.partners.push(partner);
     }
-    for (k, (second, other)) in others.iter().zip(fates_of_others).enumerate() {
+    for (k, (second, other)) in others.iter().zip(decisions_of_others).enumerate() {
         let mut back = vec![NONE; second.read as usize];
         for number in (1..=first.read as usize).filter(|number| one.is_whole(*number)) {
             back[one.partners[k][number - 1] as usize - 1] = number as u32;
         }
         other.partners.push(back);
     }
-    fates
+    decisions
 }
 
 /// Sorts keys by id and leaves one of each id, or none. Copies of one row are one row: they do not contradict each other.
-fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, fates: &mut [FileDecision]) {
+fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, decisions: &mut [FileDecision]) {
     keys.sort_unstable();
     let mut dropped = Vec::new();
     for same in keys.chunk_by(|a, b| (a.hash, a.check) == (b.hash, b.check)) {
@@ -107,8 +107,8 @@ fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, fates: &mut [Fi
         for key in same.iter().filter(|key| Some(*key) != stays) {
             let twin = stays.unwrap_or(if key == first { last } else { first });
             let copied = stays.is_some_and(|stays| stays.content == key.content);
-            if let Some(fate) = fates.get_mut(key.file as usize) {
-                fate.twins.insert(key.number, Twin { file: twin.file, line: twin.line, copied });
+            if let Some(decision) = decisions.get_mut(key.file as usize) {
+                decision.twins.insert(key.number, Twin { file: twin.file, line: twin.line, copied });
             }
             dropped.push(*key);
         }
@@ -202,9 +202,9 @@ mod tests {
         let key = |hash, number| IdFingerprint { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
         let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
         let stays = |duplicates| {
-            let (mut keys, mut fates) = (keys.clone(), [FileDecision::default()]);
-            single(&mut keys, duplicates, &mut fates);
-            let twins: Vec<(u32, u32)> = fates[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
+            let (mut keys, mut decisions) = (keys.clone(), [FileDecision::default()]);
+            single(&mut keys, duplicates, &mut decisions);
+            let twins: Vec<(u32, u32)> = decisions[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
             (keys.iter().map(|key| key.number).collect::<Vec<_>>(), twins)
         };
         assert_eq!(stays(Duplicates::Reject), (vec![2], vec![(1, 5), (3, 2), (4, 2)]));

@@ -5,96 +5,38 @@ use super::bind::{FileHeader, bind};
 use super::clock::ClockColumn;
 use super::encoding;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
-use super::lines::{RecordFields, TextReader, failed};
-use super::listing::ListingReader;
-use super::parquet::ParquetReader;
+use super::record::{BUFFER, FileFormat, RecordFields, RecordReader, failed};
 use super::row::{RecordedRow, RowReader, RowRefusal};
+use super::{lines, listing, parquet, workbook};
 use crate::error::{Error, Result, counted};
-use crate::program::listing;
-use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook};
+use crate::raw;
 use crate::stage::{Context, OpenedInput};
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
 
-/// The rows of a file of either kind.
-enum FileReader {
-    Text(TextReader),
-    Parquet(Box<ParquetReader>),
-    Program(ListingReader),
-}
+/// Every kind of file; the first that a file is, text at last.
+const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &super::feather::FORMAT, &lines::FORMAT];
 
-impl FileReader {
-    fn open(source: OpenedInput, layout: &FileLayout) -> Result<Self> {
-        let mut reader = BufReader::with_capacity(1 << 16, source.reader);
-        // The mark of four bytes is in the first buffer of any file that is long enough to be one.
-        let head = reader.fill_buf().map_err(|error| failed(&source.label, &error))?;
-        if is_workbook(head) {
-            return Ok(Self::Text(sheet(reader, &source.label, layout)?));
-        }
-        if let Some(sheet) = &layout.sheet {
-            let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
-            return Err(Error::data(&source.label, message));
-        }
-        if let Some(language) = listing(&raw::ending(Path::new(&source.label)), head) {
-            return Ok(Self::Program(ListingReader::open(reader, &source.label, language)?));
-        }
-        if head.starts_with(b"PAR1") {
-            return Ok(Self::Parquet(Box::new(ParquetReader::open(reader, &source.label)?)));
-        }
-        if is_utf16(head) {
-            let text: Box<dyn Read + Send> = Box::new(Utf16Reader::new(reader));
-            return Ok(Self::Text(TextReader::open(BufReader::with_capacity(1 << 16, text), &source.label, layout)?));
-        }
-        Ok(Self::Text(TextReader::open(reader, &source.label, layout)?))
+/// Opens a file of any kind.
+fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+    let mut reader = BufReader::with_capacity(BUFFER, source.reader);
+    let head = reader.fill_buf().map_err(|error| failed(&source.label, &error))?;
+    let ending = raw::ending(Path::new(&source.label));
+    let format = FORMATS.iter().find(|format| (format.is)(&ending, head)).expect("text at last");
+    if let Some(sheet) = layout.sheet.as_ref().filter(|_| !format.has_sheets) {
+        let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
+        return Err(Error::data(&source.label, message));
     }
-    fn label(&self) -> &str {
-        match self {
-            Self::Text(lines) => &lines.label,
-            Self::Parquet(columns) => &columns.label,
-            Self::Program(listing) => &listing.label,
-        }
-    }
-    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
-        match self {
-            Self::Text(lines) => lines.next(record),
-            Self::Parquet(columns) => columns.next(record),
-            Self::Program(listing) => Ok(listing.next(record)),
-        }
-    }
-    fn lines(&self) -> u64 {
-        match self {
-            Self::Text(lines) => lines.lines,
-            Self::Parquet(columns) => columns.rows,
-            Self::Program(listing) => listing.line(),
-        }
-    }
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Text(lines) => lines.bytes,
-            Self::Parquet(columns) => columns.bytes(),
-            Self::Program(listing) => listing.rows as u64,
-        }
-    }
-}
-
-/// A sheet of a workbook as text: its cells are delimited, and its numbers have the decimal mark that the settings announce.
-fn sheet(source: impl Read, label: &str, layout: &FileLayout) -> Result<TextReader> {
-    let data = |message: String| Error::data(label, message);
-    let mut book = Workbook::read(source).map_err(data)?;
-    let name = book.sheet(layout.sheet.as_deref()).map_err(data)?;
-    let mark = if layout.decimal == Decimal::Comma { ',' } else { '.' };
-    let lines: Box<dyn Read + Send> = Box::new(Cursor::new(book.lines(&name, mark).map_err(data)?));
-    let layout = FileLayout { delimiter: "tab".into(), ..layout.clone() };
-    TextReader::open(BufReader::new(lines), &format!("{label} sheet `{name}`"), &layout)
+    (format.open)(reader, &source.label, layout)
 }
 
 /// An opened file below its header.
 pub(super) struct OpenedFile<'a> {
     pub label: String,
-    rows: FileReader,
+    rows: Box<dyn RecordReader>,
     pub record: RecordFields,
     pub row: RecordedRow,
     reader: RowReader<'a>,
@@ -105,12 +47,9 @@ pub(super) struct OpenedFile<'a> {
 impl<'a> OpenedFile<'a> {
     /// Opens a file and finds its columns.
     pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
-        let mut rows = FileReader::open(source, layout)?;
+        let mut rows = open(source, layout)?;
         let label = rows.label().to_string();
-        let (header, decimal) = match &rows {
-            FileReader::Text(_) => (layout.header, layout.decimal),
-            FileReader::Parquet(_) | FileReader::Program(_) => (true, Decimal::Point),
-        };
+        let (header, decimal) = if rows.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
         let mut record = RecordFields::default();
         if !rows.next(&mut record)? {
             let lines = counted(rows.lines(), "line");
@@ -132,9 +71,7 @@ impl<'a> OpenedFile<'a> {
             }
             head.width = names.len();
             head.names = Some(names);
-            if let FileReader::Text(lines) = &mut rows {
-                lines.skip(layout.skip_below_header)?;
-            }
+            rows.skip(layout.skip_below_header)?;
         }
         let binding = bind(layout, &head, arm)?;
         let reader = RowReader { binding, decimal, limits, arm, last_sequence: None, clock: ClockColumn::default() };
@@ -150,8 +87,7 @@ impl<'a> OpenedFile<'a> {
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        let left = if let FileReader::Program(listing) = &self.rows { listing.remark() } else { None };
-        left.into_iter().chain(self.reader.binding.missing.iter().cloned()).collect()
+        self.rows.remark().into_iter().chain(self.reader.binding.missing.iter().cloned()).collect()
     }
     /// The slots that the file fills, and what it lacks.
     pub(super) fn binding(&self) -> &super::bind::Binding {

@@ -5,8 +5,8 @@ use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use super::encoding;
 use super::layout::{Decimal, LimitPolicy};
-use super::lines::RecordFields;
 use super::number::{self, NumberFault};
+use super::record::RecordFields;
 use super::slots::KindSlots;
 use crate::robot::ONE_AND_A_HALF_TURNS;
 

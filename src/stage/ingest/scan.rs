@@ -116,6 +116,26 @@ pub(super) struct Scan {
 const EXAMPLES: usize = 1000;
 
 impl Scan {
+    fn new(label: String, slots: Vec<usize>, packed: Option<PackedRows>) -> Self {
+        Self {
+            label,
+            lines: 0,
+            read: 0,
+            last: 0,
+            tally: RefusalCounts::new(),
+            keys: Vec::new(),
+            times: Vec::new(),
+            usable: Vec::new(),
+            packed,
+            slots,
+            turns: FileOddities::default(),
+            beyond: FileOddities::default(),
+            largest: 0.0,
+            track: None,
+            measured: None,
+            ids: Vec::new(),
+        }
+    }
     pub(super) fn refused(&self) -> u64 {
         self.tally.values().map(|count| count.rows).sum()
     }
@@ -143,24 +163,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         targets: reading.binding().points.len(),
         ..PackedRows::default()
     });
-    let mut scan = Scan {
-        label,
-        lines: 0,
-        read: 0,
-        last: 0,
-        tally: RefusalCounts::new(),
-        keys: Vec::new(),
-        times: Vec::new(),
-        usable: Vec::new(),
-        packed,
-        slots,
-        turns: FileOddities::default(),
-        beyond: FileOddities::default(),
-        largest: 0.0,
-        track: None,
-        measured: None,
-        ids: Vec::new(),
-    };
+    let mut scan = Scan::new(label, slots, packed);
     let mut measured = reading.binding().measures.then(blake3::Hasher::new);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
@@ -250,7 +253,11 @@ fn key(row: &RecordedRow, file: usize, label: &str) -> Result<IdFingerprint> {
 /// Hash of the numbers and texts of a row.
 fn content(row: &RecordedRow) -> u64 {
     let mut hasher = blake3::Hasher::new();
-    for value in row.values.iter().chain(row.points.iter().flatten()) {
+    // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
+    for (place, value) in (0u64..).zip(&row.values).filter(|(_, value)| !value.is_nan()) {
+        hasher.update(&place.to_le_bytes()).update(&value.to_bits().to_le_bytes());
+    }
+    for value in row.points.iter().flatten() {
         hasher.update(&value.to_bits().to_le_bytes());
     }
     for text in &row.texts {

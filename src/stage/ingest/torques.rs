@@ -218,7 +218,7 @@ impl<'a> MotionRows<'a> {
                         point_id: None,
                         reason: refusal.reason.word().into(),
                         detail: refusal.detail,
-                        text: open.record.text(),
+                        text: open.record.shown(),
                     })?;
                 }
             }
@@ -370,13 +370,12 @@ impl<'a> MotionRows<'a> {
     }
 
     fn finish(mut self, context: &Context) -> Result<StreamedTable<ArmMotion>> {
-        let signal = self.signal.unwrap_or("torque");
+        let (signal, rows) = (self.signal.unwrap_or("torque"), self.written);
         let dead: Vec<Fault> = (1..)
             .zip(&self.channels)
             .filter_map(|(joint, channel)| Some((joint, channel.constant()?)))
             .map(|(joint, value)| {
-                let message =
-                    format!("the {signal} of joint {joint} is {value} in each of {} rows: a dead channel", self.written);
+                let message = format!("the {signal} of joint {joint} is {value} in each of {rows} rows: a dead channel");
                 Fault::new(format!("table motion, {signal} of joint {joint}"), message)
             })
             .collect();

@@ -15,25 +15,25 @@ use std::collections::{BTreeMap, BTreeSet};
 const SMALL_IN_DEGREES: f64 = 6.5;
 
 /// Rows of a file that become part of the recording.
-pub(super) fn accepted(scan: &Scan, fate: &FileDecision) -> u64 {
-    if fate.partners.is_empty() {
-        return scan.used() - fate.twins.len() as u64;
+pub(super) fn accepted(scan: &Scan, decision: &FileDecision) -> u64 {
+    if decision.partners.is_empty() {
+        return scan.used() - decision.twins.len() as u64;
     }
-    (1..=scan.read as usize).filter(|number| fate.is_whole(*number)).count() as u64
+    (1..=scan.read as usize).filter(|number| decision.is_whole(*number)).count() as u64
 }
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
 pub(super) fn judge(
     settings: &Ingest,
     scans: &[Scan],
-    fates: &[FileDecision],
+    decisions: &[FileDecision],
     arm: &RobotJoints,
     context: &Context,
 ) -> Result<()> {
     let mut faults = unequal(settings, scans);
     for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
         let angles = implausible(scan, &layout.columns, settings.limits, arm);
-        let fault = angles.or_else(|| too_many_rejected(settings, scans, fates, index));
+        let fault = angles.or_else(|| too_many_rejected(settings, scans, decisions, index));
         if fault.is_none() {
             warn(scan, &layout.columns, settings.limits, arm, context);
         }
@@ -100,15 +100,15 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJ
     None
 }
 
-fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], index: usize) -> Option<Fault> {
-    let (scan, fate) = (scans.get(index)?, fates.get(index)?);
-    let accepted = accepted(scan, fate);
+fn too_many_rejected(settings: &Ingest, scans: &[Scan], decisions: &[FileDecision], index: usize) -> Option<Fault> {
+    let (scan, decision, layout) = (scans.get(index)?, decisions.get(index)?, settings.files.get(index)?);
+    let accepted = accepted(scan, decision);
     let rejected = scan.read - accepted;
     if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
         return None;
     }
-    let twins = fate.twins.len() as u64;
-    let copies = fate.twins.values().filter(|twin| twin.copied).count() as u64;
+    let twins = decision.twins.len() as u64;
+    let copies = decision.twins.values().filter(|twin| twin.copied).count() as u64;
     let unmatched = scan.used() - accepted - twins;
     // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
     let partner = scans.iter().enumerate().filter(|(other, _)| *other != index && (index == 0 || *other == 0));
@@ -117,17 +117,17 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], 
     let cut = partner.filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
     let mut counts = scan.tally.clone();
     let first = |copied: bool| {
-        let of_kind = fate.twins.values().filter(|twin| twin.copied == copied);
+        let of_kind = decision.twins.values().filter(|twin| twin.copied == copied);
         of_kind.map(|twin| u64::from(twin.line)).min().unwrap_or_default()
     };
-    let lonely = partner_at.map_or_else(
+    let without_partner = partner_at.map_or_else(
         || "no partner in another file".to_string(),
-        |other| format!("no partner in {}{}", scans[other].label, unlike(scans, fates, [index, other]).unwrap_or_default()),
+        |other| format!("no partner in {}{}", scans[other].label, unlike(scans, decisions, [index, other]).unwrap_or_default()),
     );
     for (reason, rows, first_line, detail) in [
         (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
         (Reason::DuplicateRow, copies, first(true), "duplicate rows".to_string()),
-        (Reason::Unmatched, unmatched, 0, lonely),
+        (Reason::Unmatched, unmatched, 0, without_partner),
     ] {
         if rows > 0 {
             counts.insert(reason, RefusalCount { rows, first_line, first_detail: detail });
@@ -162,18 +162,33 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], 
     };
     Some(Fault::new(
         place,
-        format!("{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}", listed.join("; ")),
+        format!(
+            "{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}{}",
+            listed.join("; "),
+            smaller(scan, &layout.columns)
+        ),
     ))
 }
 
+/// What points that are too large for their unit usually are, where most are.
+fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
+    let most = scan.tally.get(&Reason::OutOfRange).is_some_and(|count| 2 * count.rows > scan.read);
+    match columns.number("x").filter(|_| most).and_then(|x| x.unit.as_deref()) {
+        Some("mm") => "; if the file holds micrometres, say `unit: um`",
+        Some("m") => "; if the file holds millimetres, say `unit: mm`",
+        _ => "",
+    }
+}
+
 /// An id of each of two files that the other one lacks, where both have such: of a pair that differs in case alone, if there is one.
-fn unlike(scans: &[Scan], fates: &[FileDecision], files: [usize; 2]) -> Option<String> {
-    let lonely = |file: usize| -> Option<Vec<&str>> {
-        let (scan, fate) = (scans.get(file)?, fates.get(file)?);
-        let rows = scan.ids.iter().filter(|(number, _)| !fate.is_whole(*number as usize) && !fate.twins.contains_key(number));
+fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Option<String> {
+    let without_partner = |file: usize| -> Option<Vec<&str>> {
+        let (scan, decision) = (scans.get(file)?, decisions.get(file)?);
+        let rows =
+            scan.ids.iter().filter(|(number, _)| !decision.is_whole(*number as usize) && !decision.twins.contains_key(number));
         Some(rows.map(|(_, id)| id.as_str()).collect())
     };
-    let [here, there] = [lonely(files[0])?, lonely(files[1])?];
+    let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];
     // Of three files a row may lack its partner in the third.
     let (own, known): (BTreeSet<&str>, BTreeSet<&str>) = (here.iter().copied().collect(), there.iter().copied().collect());
     let by_case: BTreeMap<String, &str> = there.iter().map(|id| (id.to_lowercase(), *id)).collect();

@@ -1,15 +1,14 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
-use super::arm::RobotJoints;
+use super::joined::JoinDecisions;
 use super::later::Continuation;
-use super::layout::{FileLayout, Join};
+use super::layout::FileLayout;
 use super::noise::NoiseSlots;
-use super::pair::{FileDecision, NONE};
+use super::pair::FileDecision;
 use super::reading::{OpenedFile, ProgressCounter};
 use super::rejections::Rejections;
-use super::row::{Reason, RecordedRow, RowRefusal};
-use super::scan::Scan;
-use super::{Ingest, verdict};
+use super::row::RecordedRow;
+use super::verdict;
 use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
@@ -20,25 +19,16 @@ use crate::units::Unit;
 /// Rows of the recording in memory at once.
 const CHUNK: usize = 1 << 16;
 
-/// What all files give and decide together.
-pub(super) struct JoinDecisions<'a> {
-    pub settings: &'a Ingest,
-    pub arm: &'a RobotJoints,
-    pub scans: &'a [Scan],
-    pub fates: &'a [FileDecision],
-    /// Names of the files in tables.
-    pub names: &'a [String],
-}
-
-/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s.
+/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s, none where
+/// the clock is the same.
 pub(super) fn write(
     decided: &[JoinDecisions],
-    gaps: &[f64],
+    gaps: &[Option<f64>],
     names: &[String],
     context: &Context,
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
-    let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.fates).take(one.leading()));
-    let rows = rows.map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
+    let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).take(one.leading()));
+    let rows = rows.map(|(scan, decision)| verdict::accepted(scan, decision)).sum();
     context.services.begin("writing the recording", Some(rows), "rows");
     let mut recording = Chunks::new(decided, context)?;
     let mut rejected = Rejections::new(names, context)?;
@@ -59,7 +49,8 @@ fn file(
     rejected: &mut Rejections,
     context: &Context,
 ) -> Result<()> {
-    let (Some(scan), Some(fate), Some(name)) = (decided.scans.get(index), decided.fates.get(index), decided.names.get(index))
+    let (Some(scan), Some(decision), Some(name)) =
+        (decided.scans.get(index), decided.decisions.get(index), decided.names.get(index))
     else {
         return Err(Error::Bug(format!("file {index} was not scanned")));
     };
@@ -68,11 +59,11 @@ fn file(
     let mut pace = ProgressCounter::new(context);
     let mut accepted = 0;
     while let Some(judged) = reading.next()? {
-        match judged.and_then(|()| decided.outcome(index, fate, &reading.row)) {
+        match judged.and_then(|()| decided.outcome(index, decision, &reading.row)) {
             Ok(()) => {
                 accepted += 1;
                 if let Some(chunks) = &mut recording {
-                    chunks.push(&reading.row, index, fate, decided)?;
+                    chunks.push(&reading.row, index, decision, decided)?;
                     pace.row(chunks.written);
                 }
             }
@@ -82,104 +73,17 @@ fn file(
                 point_id: (!reading.row.id.is_empty()).then(|| reading.row.id.clone()),
                 reason: refusal.reason.word().into(),
                 detail: refusal.detail,
-                text: reading.record.text(),
+                text: reading.record.shown(),
             })?,
         }
     }
     if let Some(chunks) = recording {
         chunks.before += reading.row.number;
     }
-    if (reading.row.number, accepted) != (scan.read, verdict::accepted(scan, fate)) {
+    if (reading.row.number, accepted) != (scan.read, verdict::accepted(scan, decision)) {
         return Err(Error::data(&scan.label, "changed while it was read; run again"));
     }
     Ok(())
-}
-
-impl JoinDecisions<'_> {
-    /// Files whose rows are those of the recording: of joined ones the first.
-    fn leading(&self) -> usize {
-        let joined = self.fates.iter().any(|fate| !fate.partners.is_empty());
-        if joined { 1 } else { self.scans.len() }
-    }
-    /// Why a usable row is not used after all, if so.
-    fn outcome(&self, index: usize, fate: &FileDecision, row: &RecordedRow) -> Result<(), RowRefusal> {
-        if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
-            let there =
-                if twin.file as usize == index { String::new() } else { format!(" of {}", self.name(twin.file as usize)) };
-            return Err(if twin.copied {
-                let detail = format!("a copy of line {}{there}: the same id, the same values", twin.line);
-                RowRefusal { reason: Reason::DuplicateRow, detail }
-            } else {
-                let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
-                RowRefusal { reason: Reason::DuplicateId, detail }
-            });
-        }
-        if fate.is_whole(row.number as usize) {
-            return Ok(());
-        }
-        let lacks = |partner: &Vec<u32>| partner.get((row.number - 1) as usize).is_none_or(|partner| *partner == NONE);
-        let other = fate.partners.iter().position(lacks).unwrap_or_default();
-        let other = if index == 0 { self.name(other + 1) } else { self.name(0) };
-        Err(RowRefusal { reason: Reason::Unmatched, detail: self.lonely(other, index, row) })
-    }
-    /// The data row of file `file` that is part of a row of file `index`.
-    fn number(&self, file: usize, index: usize, row: &RecordedRow, fate: &FileDecision) -> Option<u64> {
-        if file == index {
-            return Some(row.number);
-        }
-        let partner = fate.partners.get(file.checked_sub(1)?)?.get((row.number - 1) as usize)?;
-        (*partner != NONE).then_some(u64::from(*partner))
-    }
-    /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
-    fn moment(&self, file: usize, row: &RecordedRow, fate: &FileDecision) -> Option<f64> {
-        let time = self.arm.slots.time;
-        let Some(Join::Time { offset_s, .. }) = &self.settings.join else { return None };
-        if file == 0 {
-            return row.values.get(time).copied();
-        }
-        let packed = self.scans.get(file)?.packed.as_ref()?;
-        let slot = packed.slots.iter().position(|slot| *slot == time)?;
-        let at = (self.number(file, 0, row, fate)? as usize - 1) * packed.slots.len() + slot;
-        Some(packed.values.get(at)? - if file == 1 { *offset_s } else { 0.0 })
-    }
-    /// How much later (s) than its joints the point of a row was measured.
-    fn later(&self, moving: usize, row: &RecordedRow, fate: &FileDecision) -> Option<f64> {
-        let values = || KINDS.iter().flat_map(|kind| kind.columns(Part::Value));
-        let files = &self.settings.files;
-        let point = files.iter().position(|file| values().any(|column| file.has(column.setting)))?;
-        let later = self.moment(point, row, fate)? - self.moment(moving, row, fate)?;
-        Some(later).filter(|later| later.is_finite())
-    }
-    /// Of a wide row of file `index`, or of its partner, the targets that were seen: which, from 1, by name, where. None of other rows.
-    fn points(&self, index: usize, row: &RecordedRow, fate: &FileDecision) -> Option<Vec<(i64, &String, [f64; 3])>> {
-        let files = &self.settings.files;
-        let wide = |file: &usize| files.get(*file).is_some_and(|layout| layout.targets.is_some());
-        let file = if fate.partners.is_empty() { Some(index).filter(wide) } else { (0..files.len()).find(wide) }?;
-        let names = files.get(file)?.targets.as_ref()?.columns.keys();
-        let points = if file == index {
-            row.points.as_slice()
-        } else {
-            let at = (self.number(file, index, row, fate)? as usize - 1) * names.len();
-            self.scans.get(file)?.packed.as_ref()?.points.get(at..at + names.len())?
-        };
-        let seen = names.zip(points).zip(1..).filter(|((_, point), _)| !point[0].is_nan());
-        Some(seen.map(|((name, point), at)| (at, name, *point)).collect())
-    }
-    fn name(&self, index: usize) -> &str {
-        self.names.get(index).map_or("", String::as_str)
-    }
-    /// A row of file `index` has no partner in the file named `other`, or that none in a third.
-    fn lonely(&self, other: &str, index: usize, row: &RecordedRow) -> String {
-        let other = if index > 0 && self.names.len() > 2 { format!("{other} (joined to all files)") } else { other.into() };
-        match &self.settings.join {
-            Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
-            Some(Join::Time { tolerance_s, .. }) => {
-                let time = row.values.get(self.arm.slots.time).copied().unwrap_or(f64::NAN);
-                format!("{other} has no row within {tolerance_s} s of {time} s")
-            }
-            _ => format!("data row {} of {other} is missing or rejected", row.number),
-        }
-    }
 }
 
 /// A stored column that some file fills, as far as it is known.
@@ -274,11 +178,11 @@ impl<'a> Chunks<'a> {
                 .unwrap_or(1),
         })
     }
-    fn push(&mut self, row: &RecordedRow, index: usize, fate: &FileDecision, decided: &JoinDecisions) -> Result<()> {
+    fn push(&mut self, row: &RecordedRow, index: usize, decision: &FileDecision, decided: &JoinDecisions) -> Result<()> {
         let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
         let (mut id, mut texts) = (&row.id, row.texts.iter().collect::<Vec<&String>>());
-        for (partner, scan) in fate.partners.iter().zip(decided.scans.iter().skip(1)) {
+        for (partner, scan) in decision.partners.iter().zip(decided.scans.iter().skip(1)) {
             let number = partner.get((row.number - 1) as usize).and_then(|number| number.checked_sub(1));
             let Some((at, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
             let width = packed.slots.len();
@@ -294,7 +198,7 @@ impl<'a> Chunks<'a> {
                 *own = other.as_ref().and_then(|other| other.get(at)).unwrap_or(own);
             }
         }
-        self.carry(decided, index, row, fate);
+        self.carry(decided, index, row, decision);
         let number = self.before + row.number;
         let time = self.merged[decided.arm.slots.time];
         let (sequence, time) = self.rows.next(row.sequence.unwrap_or(number as i64), time).map_err(|(sequence, last)| {
@@ -308,7 +212,7 @@ impl<'a> Chunks<'a> {
             Some(name) => format!("{name} row {}", row.number),
             None => format!("row {number}"),
         };
-        let Some(points) = decided.points(index, row, fate) else { return self.one(sequence, id, &texts) };
+        let Some(points) = decided.points(index, row, decision) else { return self.one(sequence, id, &texts) };
         // Numbered through: the targets of a row follow each other.
         let first = sequence.saturating_sub(1).saturating_mul(self.widest);
         let (merged, of_target) = (self.merged.clone(), self.texts.iter().position(|(name, _)| *name == "target"));
@@ -342,17 +246,18 @@ impl<'a> Chunks<'a> {
         Ok(())
     }
     /// Velocities that follow from the joints over time; with a join by time joints and velocities at the moment of the point.
-    fn carry(&mut self, decided: &JoinDecisions, index: usize, row: &RecordedRow, fate: &FileDecision) {
+    fn carry(&mut self, decided: &JoinDecisions, index: usize, row: &RecordedRow, decision: &FileDecision) {
         let slots = &decided.arm.slots;
         // Of files that continue each other each has its own joints.
-        let moving = if fate.partners.is_empty() { index } else { self.moving };
-        let track = decided.scans.get(moving).and_then(|scan| scan.track.as_ref()).zip(decided.number(moving, index, row, fate));
+        let moving = if decision.partners.is_empty() { index } else { self.moving };
+        let track =
+            decided.scans.get(moving).and_then(|scan| scan.track.as_ref()).zip(decided.number(moving, index, row, decision));
         if let (Some((track, number)), Some(_)) = (track, &decided.settings.motion)
             && let Some(velocity) = self.merged.get_mut(slots.velocity.clone())
         {
             track.fill(number, velocity);
         }
-        let apart = decided.later(moving, row, fate);
+        let apart = decided.later(moving, row, decision);
         let known = decided.settings.motion.as_ref().map_or(0.0, |motion| motion.later_s);
         let later = apart.unwrap_or(0.0) + known;
         if later == 0.0 {

@@ -85,46 +85,19 @@ impl Case {
     pub fn make(design: &Design, number: usize, content: Content) -> Result<Case, String> {
         let seed = design.seed_of(number);
         let mut draw = Noise::new(seed, Purpose::Design);
-        let kinds = design.kinds();
-        let kind = kinds[draw.index(kinds.len())];
-        // The reflector off the last axis in half of the cases: else that joint's own turn cannot be seen.
-        let aside = if draw.chance(0.5) { draw.vector(30.0, 80.0).map(f64::round) } else { [0.0; 3] };
-        let robot = kind.description(aside);
+        let (kind, robot) = arm(design, &mut draw);
         let truth = errors(&robot, &mut draw);
-        let tracker = tracker(kind, content == Content::Null, &mut draw);
         let beyond_list = design.collection == Collection::Beyond;
-        let scatter = design.scatter.or_else(|| beyond_list.then(|| scatter(&mut draw)));
-        let tracker = Tracker { scatter: scatter.unwrap_or(tracker.scatter), ..tracker };
+        let tracker = instrument(design, kind, content, &mut draw);
         let (play_rad, repeated) = if draw.chance(0.5) { (1e-6 * draw.uniform(4.0, 16.0), 0.1) } else { (0.0, 0.0) };
         let fit = design.points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
-        let lasts_s = (fit + validate) as f64 * 19.0;
-        // Two time constants in a recording, more or less.
-        let warm_up_h = lasts_s / draw.uniform(1.5, 3.5) / 3600.0;
-        let climate = Climate { pace_s: [12.0, 26.0], start_c: 20.0, rise_k: 15.0, warm_up_h, ..Climate::default() };
-        // Else temperature is a function of time, and what lags it another one.
-        let swing = |draw: &mut Noise| Climate {
-            swing_k: draw.uniform(2.0, 4.0),
-            swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0,
-            ..climate.clone()
-        };
-        let climate = if beyond_list { swing(&mut draw) } else { climate };
+        let climate = weather((fit + validate) as f64 * 19.0, beyond_list, &mut draw);
         let ranges: Vec<[f64; 2]> =
             robot.joints.iter().map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw)).collect();
-        let points = points::plan(
-            kind,
-            &ranges,
-            Amount {
-                fit,
-                validate,
-                repeated,
-                near: if beyond_list { NEAR } else { 0.0 },
-                loaded: !design.bare,
-                layout: design.layout,
-            },
-            &climate,
-            seed,
-        )?;
+        let near = if beyond_list { NEAR } else { 0.0 };
+        let amount = Amount { fit, validate, repeated, near, loaded: !design.bare, layout: design.layout };
+        let points = points::plan(kind, &ranges, amount, &climate, seed)?;
         let to_fit = &points[..fit.min(points.len())];
         let site = Site { robot: &robot, truth: &truth, tracker: &tracker, points: to_fit };
         let held_out = Site { points: &points[fit.min(points.len())..], ..site };
@@ -132,18 +105,9 @@ impl Case {
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
         let sight = Sight { site: &site, shadow: &shadow, noise: 1e-3 * noise_mm[0] };
-        let (drafts, concealed) = if content == Content::Foreign {
-            drawn(&bench, &sight, &mut draw)
-        } else if beyond_list {
-            beyond(design, content, &bench, &sight, &mut draw)
-        } else {
-            let drafts = drafts(design, content, &bench, &mut draw);
-            let concealed = size(design, &drafts, &sight, &mut draw);
-            (drafts, concealed)
-        };
+        let (drafts, concealed) = concealing(design, content, &bench, &sight, &mut draw);
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
-
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
         let (friction, motors) = drives(&robot, &bench, &mut draw);
@@ -214,6 +178,46 @@ impl Case {
         let named = causes.into_iter().map(|one| (one.cause.effect, one.cause.place.clone()));
         named.chain(self.tampered.iter().map(|one| (one.effect, "recording".to_string()))).collect()
     }
+}
+
+/// One of the design's robots; the reflector off the last axis in half of the cases, else that joint's own turn cannot be seen.
+fn arm(design: &Design, draw: &mut Noise) -> (Kind, RobotDescription) {
+    let kinds = design.kinds();
+    let kind = kinds[draw.index(kinds.len())];
+    let aside = if draw.chance(0.5) { draw.vector(30.0, 80.0).map(f64::round) } else { [0.0; 3] };
+    (kind, kind.description(aside))
+}
+
+/// What the case conceals, each effect as visible as drawn.
+fn concealing(design: &Design, content: Content, bench: &Bench, sight: &Sight, draw: &mut Noise) -> (Vec<Draft>, Vec<Concealed>) {
+    if content == Content::Foreign {
+        return drawn(bench, sight, draw);
+    }
+    if design.collection == Collection::Beyond {
+        return beyond(design, content, bench, sight, draw);
+    }
+    let drafts = drafts(design, content, bench, draw);
+    let concealed = size(design, &drafts, sight, draw);
+    (drafts, concealed)
+}
+
+/// Clock and temperature of a recording that lasts so many seconds: two time constants, more or less.
+fn weather(lasts_s: f64, swings: bool, draw: &mut Noise) -> Climate {
+    let warm_up_h = lasts_s / draw.uniform(1.5, 3.5) / 3600.0;
+    let climate = Climate { pace_s: [12.0, 26.0], start_c: 20.0, rise_k: 15.0, warm_up_h, ..Climate::default() };
+    if !swings {
+        return climate;
+    }
+    // Without a swing temperature is a function of time, and what lags it another one.
+    Climate { swing_k: draw.uniform(2.0, 4.0), swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0, ..climate }
+}
+
+/// The tracker, with the scatter that the design asks for.
+fn instrument(design: &Design, kind: Kind, content: Content, draw: &mut Noise) -> Tracker {
+    let tracker = tracker(kind, content == Content::Null, draw);
+    let beyond_list = design.collection == Collection::Beyond;
+    let scatter = design.scatter.or_else(|| beyond_list.then(|| scatter(draw)));
+    Tracker { scatter: scatter.unwrap_or(tracker.scatter), ..tracker }
 }
 
 /// Friction, in half of the cases, and the motors that show it.

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 /// How a cause was named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// Named, at its place, as the first choice.
+    /// Named, at its place, as the first choice; by a name and place that data cannot separate from it, too.
     Exact,
     /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
     InSet,
@@ -143,7 +143,8 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
     let causes = truth.effects.iter().filter(|cause| cause.wanted).map(|cause| {
         let own = atoms(&cause.effect, &cause.place);
-        let outcome = if own.is_subset(&found) {
+        let same: Atoms = cause.same.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
+        let outcome = if own.is_subset(&found) || !same.is_disjoint(&found) {
             Outcome::Exact
         } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
             Outcome::InSet
@@ -197,6 +198,6 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let after = answer.after.as_ref()?.validate_rms_mm?;
     let found: usize = answer.findings.iter().map(|finding| finding.parameters.len()).sum();
     let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
-    let floor = 3f64.sqrt() * truth.noise.validate_rms_per_axis_mm;
+    let floor = 3f64.sqrt() * truth.noise.as_ref()?.validate_rms_per_axis_mm;
     Some(HeldOut { before, after, bound: floor * (1.0 + p / (n - p - 1.0).max(1.0)).sqrt() })
 }

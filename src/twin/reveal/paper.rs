@@ -47,8 +47,9 @@ pub struct Cause {
     /// Squared visible displacement over the noise's variance.
     #[serde(rename = "L")]
     pub strength: f64,
-    /// What geometry and the other causes leave, rms, mm.
-    pub visible_rms_mm: f64,
+    /// What data cannot separate from it: as good as its own name and place.
+    #[serde(default)]
+    pub same: Vec<Name>,
     /// Its true numbers.
     pub parameters: Vec<Number>,
 }
@@ -95,9 +96,11 @@ pub struct Truth {
     /// How many points.
     pub points: Points,
     /// Numbers that geometry amounts to.
+    #[serde(default)]
     pub geometry_rank: usize,
-    /// As it fell out.
-    pub noise: NoiseSize,
+    /// As it fell out, of recordings of points.
+    #[serde(default)]
+    pub noise: Option<NoiseSize>,
 }
 
 /// Errors of held-out points.

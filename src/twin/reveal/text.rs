@@ -16,16 +16,7 @@ impl Board {
     /// The scoreboard as text, mm and percent.
     pub fn text(&self) -> String {
         let mut out = format!("{} recordings judged, {} without a verdict\n", self.cases.len(), self.missing.len());
-        for (title, company) in [("alone in its recording", Company::Alone), ("beside others", Company::Beside)] {
-            let bins = self.by_strength(company);
-            if bins.iter().all(|counts| counts.all() == 0) {
-                continue;
-            }
-            let _ = writeln!(out, "\neffects {title}\n  L             n  exact  in set  wrong  silent   exact");
-            for (bin, counts) in bins.iter().enumerate() {
-                let _ = writeln!(out, "  {:<9}{}", range(bin), line(counts));
-            }
-        }
+        self.tell_strengths(&mut out);
         let by_effect = self.by_effect();
         if !by_effect.is_empty() {
             let _ = writeln!(
@@ -97,6 +88,20 @@ impl Board {
             let _ = writeln!(out, "no verdict: {case}: {why}");
         }
         out
+    }
+
+    /// Effects by how strong they are, alone in their recording and beside others.
+    fn tell_strengths(&self, out: &mut String) {
+        for (title, company) in [("alone in its recording", Company::Alone), ("beside others", Company::Beside)] {
+            let bins = self.by_strength(company);
+            if bins.iter().all(|counts| counts.all() == 0) {
+                continue;
+            }
+            let _ = writeln!(out, "\neffects {title}\n  L             n  exact  in set  wrong  silent   exact");
+            for (bin, counts) in bins.iter().enumerate() {
+                let _ = writeln!(out, "  {:<9}{}", range(bin), line(counts));
+            }
+        }
     }
 
     /// Places and names of due effects, and their recordings' held-out errors.

@@ -1,5 +1,6 @@
 //! A case of a seed: which arm, which masses within their tolerance, which effects in which sizes and forms.
 
+use super::family::{FAMILIES, OPEN, Pool};
 use super::law::Law;
 use super::path::Path;
 use super::rigid::{Body, Machine};
@@ -8,21 +9,78 @@ use crate::matrix::{self, Vector};
 use crate::noise::{Noise, Purpose};
 use calib_foundation::description::{DeclaredInertias, InertiaMoments, MassTolerance, RobotDescription};
 
-/// What is drawn.
+/// What a set of recordings is drawn from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueDesign {
     /// The same seed gives the same recordings.
     pub seed: u64,
-    /// Share of recordings without any effect.
+    /// How many.
+    pub cases: usize,
+    /// Shares of recordings without any effect but, in half of them, friction of all joints; with two effects beside that friction; with
+    /// one that is in no list. The rest has one.
     pub nulls: f64,
+    /// With two effects.
+    pub pairs: f64,
+    /// With an effect that is in no list.
+    pub open: f64,
     /// Share of effects in a form that is not the usual formula.
     pub other_forms: f64,
-    /// Effects beside viscous and Coulomb friction: at most so many.
-    pub most: usize,
     /// Seconds of the recording: two stretches to fit, two that judge.
     pub seconds: f64,
     /// Rows a second.
     pub rate: f64,
+}
+
+/// How much a recording conceals, the friction of all joints apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TorqueContent {
+    /// Nothing.
+    Null,
+    /// An effect of the list.
+    Single,
+    /// Two of them.
+    Pair,
+    /// One that is in no list.
+    Open,
+}
+
+impl TorqueContent {
+    /// As a truth has it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Null => "null",
+            Self::Single => "single",
+            Self::Pair => "pair",
+            Self::Open => "open",
+        }
+    }
+}
+
+impl TorqueDesign {
+    /// Of the recording of this number: shares are kept by multiples of the golden ratio, whose order says nothing.
+    fn content(&self, number: usize) -> TorqueContent {
+        let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
+        let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
+        let shares = [(TorqueContent::Null, self.nulls), (TorqueContent::Pair, self.pairs), (TorqueContent::Open, self.open)];
+        let mut end = 0.0;
+        for (content, share) in shares {
+            end += share;
+            if at < end {
+                return content;
+            }
+        }
+        TorqueContent::Single
+    }
+
+    /// Families in an order of the seed: in turn, all are drawn.
+    fn family(&self, number: usize) -> usize {
+        let mut draw = Noise::new(self.seed, Purpose::Faults);
+        let mut order: Vec<usize> = (0..FAMILIES).collect();
+        for last in (1..FAMILIES).rev() {
+            order.swap(last, draw.index(last + 1));
+        }
+        order[number % FAMILIES]
+    }
 }
 
 /// A recording to be made.
@@ -34,10 +92,11 @@ pub struct TorqueCase {
     pub seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
-    /// What is concealed; joints from 0.
+    pub(super) content: TorqueContent,
+    /// What is concealed, friction of all joints first; joints from 0.
     pub(super) laws: Vec<Law>,
-    /// Whether a law has another form than the usual formula.
-    pub(super) other_form: Vec<bool>,
+    /// How many laws are friction of all joints.
+    pub(super) common: usize,
     pub(super) stated: Machine,
     pub(super) scattered: Machine,
     /// Hz of the rows.
@@ -87,8 +146,9 @@ impl TorqueCase {
         let mut case = Self {
             name: format!("torque_{number:03}"),
             seed,
+            content: design.content(number),
             laws: Vec::new(),
-            other_form: Vec::new(),
+            common: 0,
             stated,
             scattered,
             rate: design.rate,
@@ -108,150 +168,59 @@ impl TorqueCase {
         let level = noise.uniform(0.7, 1.4);
         case.white = peak.iter().map(|peak| level * (0.01 * peak + 0.001 * most)).collect();
         case.lasting = case.white.iter().map(|white| 0.27 * white).collect();
-        if !noise.chance(design.nulls) {
-            case.conceal(design, &peak, &mut noise);
-        }
+        case.conceal(design, number, &peak, &mut noise);
         case
     }
 
-    fn conceal(&mut self, design: &TorqueDesign, peak: &[f64], noise: &mut Noise) {
-        let n = peak.len();
-        let speed = 1.0;
+    fn conceal(&mut self, design: &TorqueDesign, number: usize, peak: &[f64], noise: &mut Noise) {
         let floor = peak.iter().copied().fold(0.0, f64::max) * 0.01;
         let scale: Vec<f64> = peak.iter().map(|peak| peak.max(floor)).collect();
         let width = noise.uniform(0.004, 0.012);
-        if noise.chance(0.85) {
+        let null = self.content == TorqueContent::Null;
+        if noise.chance(if null { 0.5 } else { COMMON }) {
             for (joint, scale) in scale.iter().enumerate() {
                 let other = noise.chance(design.other_forms * 0.3);
                 let exponent = if other { noise.uniform(0.6, 0.8) } else { 1.0 };
-                let size = scale * noise.uniform(0.04, 0.12) / speed;
-                self.push(Law::Viscous { joint, size, exponent }, other);
-                self.push(Law::Coulomb { joint, size: scale * noise.uniform(0.05, 0.15), width }, false);
+                self.laws.push(Law::Viscous { joint, size: scale * noise.uniform(0.04, 0.12), exponent });
+                self.laws.push(Law::Coulomb { joint, size: scale * noise.uniform(0.05, 0.15), width });
             }
         }
-        let plain = !self.laws.is_empty();
-        let mut used: Vec<(usize, Option<usize>)> = Vec::new();
-        for _ in 0..noise.index(design.most + 1).max(usize::from(!plain)) {
-            let pool = Extra { width, plain, n, sensors: self.sensors, scale: &scale, machine: &self.stated };
+        self.common = self.laws.len();
+        let pool = Pool {
+            width,
+            common: self.common > 0,
+            sensors: self.sensors,
+            scale: &scale,
+            machine: &self.stated,
+            touched: self.paths[0].duration,
+        };
+        let wanted = match self.content {
+            TorqueContent::Null => 0,
+            TorqueContent::Single | TorqueContent::Open => 1,
+            TorqueContent::Pair => 2,
+        };
+        let mut drawn: Vec<(usize, Law)> = Vec::new();
+        let mut family = match self.content {
+            TorqueContent::Open => FAMILIES + noise.index(OPEN),
+            _ => design.family(number),
+        };
+        while drawn.len() < wanted {
             let other = noise.chance(design.other_forms);
-            let (family, law) = pool.law(noise, other, &self.paths);
-            let joint = law.joint();
-            // One of a kind, and one modifier of friction a joint: two hide each other.
-            if used.iter().any(|(known, at)| *known == family || (at.is_some() && *at == joint)) {
-                continue;
-            }
-            used.push((family, joint));
-            let has_another_form = other && law.has_other_form();
-            self.push(law, has_another_form);
+            let law = pool.law(family, noise, other);
+            // One of a kind, and one a joint: two hide each other.
+            let apart = |law: &Law| {
+                drawn.iter().all(|(known, one)| *known != family && (one.joint().is_none() || one.joint() != law.joint()))
+            };
+            let law = law.filter(apart);
+            drawn.extend(law.map(|law| (family, law)));
+            family = noise.index(FAMILIES);
         }
-    }
-
-    fn push(&mut self, law: Law, other: bool) {
-        self.laws.push(law);
-        self.other_form.push(other);
+        self.laws.extend(drawn.into_iter().map(|(_, law)| law));
     }
 }
 
-/// What effects are drawn with.
-struct Extra<'a> {
-    width: f64,
-    /// Whether joints have friction that others modify.
-    plain: bool,
-    n: usize,
-    sensors: bool,
-    /// Nm, by joint.
-    scale: &'a [f64],
-    machine: &'a Machine,
-}
-
-const FAMILIES: usize = 22;
-
-impl Extra<'_> {
-    /// An effect of a family that this arm can have; `other` where it has another form, if there is one.
-    fn law(&self, noise: &mut Noise, other: bool, paths: &[Path]) -> (usize, Law) {
-        loop {
-            let family = noise.index(FAMILIES);
-            if let Some(law) = self.of_family(family, noise, other, paths) {
-                return (family, law);
-            }
-        }
-    }
-
-    fn of_family(&self, family: usize, noise: &mut Noise, other: bool, paths: &[Path]) -> Option<Law> {
-        let joint = noise.index(self.n);
-        let scale = self.scale[joint];
-        let width = self.width;
-        let angle = |noise: &mut Noise| noise.uniform(-1.5, 1.5);
-        if family < 5 && !self.plain {
-            return None;
-        }
-        Some(match family {
-            0 => Law::Asymmetric { joint, size: scale * noise.uniform(0.04, 0.1), width },
-            1 => {
-                let exponent = if other { 2.0 } else { 1.0 };
-                Law::Stribeck { joint, size: scale * noise.uniform(0.08, 0.2), speed: noise.uniform(0.04, 0.12), exponent }
-            }
-            2 => {
-                let (size, travel) = (scale * noise.uniform(0.08, 0.2), noise.size(0.004, 0.03));
-                Law::Presliding { joint, size, travel, width, parallel: other }
-            }
-            3 => {
-                let exponent: f64 = if other { noise.uniform(0.7, 0.9) } else { 1.0 };
-                Law::Load { joint, share: noise.uniform(0.06, 0.2) * scale.powf(1.0 - exponent), exponent, width }
-            }
-            4 => Law::Warmup { joint, share: noise.uniform(0.4, 1.0), time: noise.uniform(6.0, 14.0) },
-            5 => {
-                let (joint, by) = (self.n - 1, self.n - 2);
-                let scale = self.scale[joint].min(self.scale[by]);
-                let (viscous, coulomb) = (scale * noise.uniform(0.1, 0.2), scale * noise.uniform(0.1, 0.2));
-                Law::WristCoupling { joint, by, ratio: noise.sign(), viscous, coulomb, width }
-            }
-            6 => Law::Rotor { joint, inertia: scale * noise.uniform(0.03, 0.08) },
-            7 => Law::TorqueConstant { joint, share: noise.sign() * noise.uniform(0.06, 0.15) },
-            8 => Law::Offset { joint, size: noise.sign() * scale * noise.uniform(0.03, 0.1) },
-            9 => {
-                let order = (1 + noise.index(6)) as f64;
-                Law::Ripple { joint, size: scale * noise.uniform(0.02, 0.06), order, phase: noise.uniform(0.0, 6.2) }
-            }
-            10 => Law::Spring { joint: 1, size: self.scale[1] * noise.uniform(0.1, 0.25), zero: angle(noise) },
-            11 => {
-                let hardening = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
-                Law::Cable { joint, stiffness: scale * noise.uniform(0.04, 0.12), zero: angle(noise), hardening }
-            }
-            12 => Law::Latency { time: noise.uniform(0.006, 0.02) },
-            13 => {
-                let (frequency, damping) = (noise.uniform(18.0, 35.0), noise.uniform(0.05, 0.2));
-                Law::Elasticity { joint, frequency, damping }
-            }
-            14 => Law::Backlash { joint, size: scale * noise.uniform(0.06, 0.15), time: noise.uniform(0.03, 0.08) },
-            15 => {
-                let start = noise.uniform(2.0, paths[0].duration - 4.0);
-                let reach = matrix::norm(matrix::minus(self.machine.tool, self.machine.points[0])).max(0.3);
-                let most = self.scale.iter().copied().fold(0.0, f64::max);
-                let size = 0.1 * most / reach;
-                Law::Contact { start, end: start + noise.uniform(0.8, 1.6), force: noise.vector(size, 3.0 * size) }
-            }
-            16 => {
-                let payload = self.machine.payload.map_or(0.0, |payload| payload.mass);
-                let centre = if other { noise.vector(0.01, 0.03) } else { [0.0; 3] };
-                Law::Payload { mass: noise.sign() * payload * noise.uniform(0.1, 0.3), centre }
-            }
-            17 => Law::LinkMass { link: 1 + noise.index(self.n - 2), share: noise.sign() * noise.uniform(0.06, 0.15) },
-            18 => Law::LinkCentre { link: 1 + noise.index(self.n - 2), shift: noise.vector(0.02, 0.05) },
-            19 => Law::LinkInertia { link: noise.index(self.n - 1), share: noise.uniform(0.4, 1.0) },
-            20 => {
-                let [x, y, _] = noise.vector(0.02, 0.05);
-                Law::Tilt { by: [x, y] }
-            }
-            _ if other => {
-                let by = (joint + 1 + noise.index(self.n - 1)) % self.n;
-                Law::Meshing { joint, by, size: scale * noise.uniform(0.06, 0.15), order: (2 + noise.index(2)) as f64 }
-            }
-            _ => return None,
-        })
-        .filter(|law| !(self.sensors && matches!(law, Law::TorqueConstant { .. } | Law::Rotor { .. })))
-    }
-}
+/// Share of recordings in which all joints have friction.
+const COMMON: f64 = 0.85;
 
 /// The arm with a payload, inertias and tolerances declared.
 fn declared(kind: Kind, noise: &mut Noise) -> RobotDescription {
@@ -314,7 +283,7 @@ fn scattered(stated: &Machine, noise: &mut Noise) -> Machine {
 }
 
 /// Sines to fit, moves to fit, sines and moves that judge.
-fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
+pub(super) fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()

@@ -10,9 +10,6 @@ use std::fmt::Write;
 /// A file's name and its bytes.
 pub type TorqueFile = (&'static str, String);
 
-/// An effect that shows less than this need not be found.
-const PLAIN: f64 = 80.0;
-
 impl TorqueCase {
     /// robot.json and recording.csv.
     pub fn recording(&self) -> [TorqueFile; 2] {
@@ -20,30 +17,32 @@ impl TorqueCase {
         [("robot.json", pretty(&self.robot_json())), ("recording.csv", self.csv(&rows))]
     }
 
-    /// truth.json (what is concealed, with numbers) and want.json (what a diagnosis is asked for).
-    pub fn truth(&self) -> [TorqueFile; 2] {
+    /// The truth: what is concealed, with its numbers and how visible each effect is.
+    pub fn sealed(&self) -> String {
         let rows = self.all();
-        let effects = self.laws.iter().zip(&self.other_form).map(
-            |(law, other)| json!({ "effect": law.name(), "where": law.place(), "law": format!("{law:?}"), "other_form": other }),
-        );
-        let truth = json!({
-            "case": self.name, "robot": self.robot.name, "seed": self.seed, "effects": effects.collect::<Vec<_>>(),
+        let pair = |effect: &str, place: &str| json!({ "effect": effect, "where": place });
+        let seen = self.visible(&rows);
+        let mut accepted = Vec::new();
+        let mut effects = Vec::new();
+        for (number, (law, seen)) in self.laws.iter().zip(&seen).enumerate() {
+            let kin = law.kin().iter().map(|effect| pair(effect, &law.place()));
+            let same: Vec<Value> = seen.same.iter().map(|(effect, place)| pair(effect, place)).chain(kin).collect();
+            let other = law.is_of_another_form();
+            accepted.extend(same.iter().cloned());
+            effects.push(json!({
+                "effect": law.name(), "where": law.place(), "form": if other { "other" } else { "usual" }, "strange": other,
+                "wanted": number >= self.common, "same": same, "law": format!("{law:?}"),
+                "L": seen.l, "L_before_projection": seen.before, "parameters": [],
+            }));
+        }
+        let names: Vec<&str> = self.laws[self.common..].iter().map(Law::name).collect();
+        let to_fit = rows.validate.iter().filter(|validate| !**validate).count();
+        pretty(&json!({
+            "case": self.name, "content": self.content.name(), "family": names.join("+"), "robot": self.robot.name,
+            "seed": self.seed, "accepted": accepted, "effects": effects, "tampered": [],
+            "points": { "fit": to_fit, "validate": rows.validate.len() - to_fit },
             "noise_nm": { "white": self.white, "lasting": self.lasting },
-        });
-        let wanted = self.laws.iter().zip(self.visible(&rows)).map(|(law, seen)| {
-            let own = json!([law.name(), law.place()]);
-            let accept: Vec<Value> = std::iter::once(own).chain(seen.same.iter().map(|pair| json!(pair))).collect();
-            let mut wanted = json!({
-                "effect": law.name(), "where": law.place(), "accept": accept,
-                "L": seen.l, "L_before_projection": seen.before, "optional": seen.l < PLAIN,
-            });
-            if let Law::Contact { start, end, .. } = law {
-                wanted["window"] = json!([start, end]);
-            }
-            wanted
-        });
-        let want = json!({ "case": self.name, "effects": wanted.collect::<Vec<_>>() });
-        [("truth.json", pretty(&truth)), ("want.json", pretty(&want))]
+        }))
     }
 
     fn all(&self) -> TorqueRows {

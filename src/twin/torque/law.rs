@@ -2,6 +2,26 @@
 
 use super::rigid::JointState;
 
+/// How friction at creeping speed falls with speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fall {
+    /// exp(-(|v| / speed)^exponent).
+    Exponential(f64),
+    /// 1 / (1 + (v / speed)^2).
+    Rational,
+}
+
+/// What bends before a joint slides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bristles {
+    /// Of one travel, which give way more and more.
+    One,
+    /// Of two travels in parallel.
+    Two,
+    /// Springs of three travels that hold until they slip.
+    Slipping,
+}
+
 /// An effect with its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Law {
@@ -9,38 +29,38 @@ pub enum Law {
     Viscous { joint: usize, size: f64, exponent: f64 },
     /// Nm; rises from zero within `width`, rad/s.
     Coulomb { joint: usize, size: f64, width: f64 },
-    /// Nm more in the positive direction.
-    Asymmetric { joint: usize, size: f64, width: f64 },
-    /// Nm more at creeping speed, gone beyond `speed`, rad/s; exponent 1, or 2 (Gaussian).
-    Stribeck { joint: usize, size: f64, speed: f64, exponent: f64 },
-    /// Of Coulomb friction: bristles that bend over a travel (rad); in another form two kinds of them in parallel.
-    Presliding { joint: usize, size: f64, travel: f64, width: f64, parallel: bool },
+    /// Nm more in the positive direction; in another form it is a share of speed, too.
+    Asymmetric { joint: usize, size: f64, width: f64, by_speed: f64 },
+    /// Nm more at creeping speed, gone beyond `speed`, rad/s.
+    Stribeck { joint: usize, size: f64, speed: f64, fall: Fall },
+    /// Of Coulomb friction: bristles that bend over a travel (rad).
+    Presliding { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles },
     /// Friction as a share of what the gear transmits.
     Load { joint: usize, share: f64, exponent: f64, width: f64 },
-    /// Friction that falls as the gear warms up: share at the begin, and time, s.
-    Warmup { joint: usize, share: f64, time: f64 },
+    /// Friction that falls as the gear warms up: share at the begin, and time, s; exponential, in another form as 1 / (1 + t / time).
+    Warmup { joint: usize, share: f64, time: f64, slow: bool },
     /// Friction of a coupled pair by v_joint + ratio v_by, on both.
     WristCoupling { joint: usize, by: usize, ratio: f64, viscous: f64, coulomb: f64, width: f64 },
     /// kg m2 at the joint.
     Rotor { joint: usize, inertia: f64 },
-    /// True torque per stated torque, less 1.
-    TorqueConstant { joint: usize, share: f64 },
+    /// True torque per stated torque, less 1; in another form it falls with torque, to half at so many Nm.
+    TorqueConstant { joint: usize, share: f64, half: f64 },
     /// Nm.
     Offset { joint: usize, size: f64 },
-    /// Nm, so many per turn of the joint.
-    Ripple { joint: usize, size: f64, order: f64, phase: f64 },
-    /// A balancer: -size sin(q - zero), Nm.
-    Spring { joint: usize, size: f64, zero: f64 },
+    /// Nm, so many per turn of the joint; in another form with an overtone, as a share.
+    Ripple { joint: usize, size: f64, order: f64, phase: f64, overtone: f64 },
+    /// A balancer: -size sin(q - zero), Nm; in another form a gas spring that is stiffer the more it is bent, by a share.
+    Spring { joint: usize, size: f64, zero: f64, gas: f64 },
     /// A hose: -stiffness (q - zero), Nm/rad; hardening in another form.
     Cable { joint: usize, stiffness: f64, zero: f64, hardening: f64 },
     /// s that torques are logged late.
     Latency { time: f64 },
     /// The gear swings: rad/s and damping ratio.
     Elasticity { joint: usize, frequency: f64, damping: f64 },
-    /// Nm after each reversal, and its time, s.
-    Backlash { joint: usize, size: f64, time: f64 },
-    /// N at the tool between two times, s.
-    Contact { start: f64, end: f64, force: [f64; 3] },
+    /// Nm after each reversal, and its time, s; in another form half a wave.
+    Backlash { joint: usize, size: f64, time: f64, wave: bool },
+    /// N at the tool between two times, s: half a wave, in another form a push that is held.
+    Contact { start: f64, end: f64, force: [f64; 3], held: bool },
     /// kg more on the tool, centre off by m.
     Payload { mass: f64, centre: [f64; 3] },
     /// Share of a link's mass.
@@ -53,12 +73,16 @@ pub enum Law {
     Tilt { by: [f64; 2] },
     /// No entry of a library: friction of a joint by another one's position, Nm.
     Meshing { joint: usize, by: usize, size: f64, order: f64 },
+    /// No entry of a library: friction (Nm) by a random smooth curve of speed, waves (rad s, phase, share) of it.
+    SpeedCurve { joint: usize, size: f64, width: f64, waves: [[f64; 3]; 3] },
+    /// No entry of a library: torque (Nm) by a random smooth curve of the joint's angle that no turn repeats.
+    AngleCurve { joint: usize, size: f64, waves: [[f64; 3]; 3] },
 }
 
 /// What a law keeps of the past.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Past {
-    bristle: [f64; 2],
+    bristle: [f64; 3],
     swing: [f64; 2],
     direction: f64,
     since: f64,
@@ -76,8 +100,58 @@ pub(super) struct Moment<'a> {
     pub friction: &'a [f64],
 }
 
+impl Past {
+    /// What a knock of unit height after each reversal is at present.
+    fn knock(&mut self, v: f64, time: f64, wave: bool, step: f64) -> f64 {
+        if v.abs() > 0.01 && v.signum() != self.direction {
+            self.since = if self.direction == 0.0 { f64::INFINITY } else { 0.0 };
+            self.direction = v.signum();
+        }
+        let since = self.since / time;
+        if !since.is_finite() {
+            return 0.0;
+        }
+        self.since += step;
+        self.direction * if wave { (0.25 * std::f64::consts::PI * since.min(4.0)).sin() } else { since * (1.0 - since).exp() }
+    }
+}
+
 fn sign(v: f64, width: f64) -> f64 {
     (v / width).tanh()
+}
+
+/// A sum of waves (rate, phase, share).
+fn curve(waves: &[[f64; 3]], x: f64) -> f64 {
+    waves.iter().map(|[rate, phase, share]| share * (rate * x + phase).sin()).sum()
+}
+
+impl Bristles {
+    /// Shares and travels, as parts of the stated one.
+    fn parts(self) -> &'static [(f64, f64)] {
+        match self {
+            Self::One => &[(1.0, 1.0)],
+            Self::Two => &[(0.6, 0.5), (0.4, 2.0)],
+            Self::Slipping => &[(0.4, 0.5), (0.35, 1.0), (0.25, 2.5)],
+        }
+    }
+
+    /// How far a bristle is bent after a move, in travels.
+    fn bent(self, z: f64, moved: f64) -> f64 {
+        match self {
+            Self::Slipping => (z + moved).clamp(-1.0, 1.0),
+            // Exact for a constant velocity.
+            _ => moved.signum() + (z - moved.signum()) * (-moved.abs()).exp(),
+        }
+    }
+}
+
+impl Fall {
+    fn at(self, speeds: f64) -> f64 {
+        match self {
+            Self::Exponential(exponent) => (-speeds.powf(exponent)).exp(),
+            Self::Rational => 1.0 / (1.0 + speeds * speeds),
+        }
+    }
 }
 
 impl Law {
@@ -101,27 +175,32 @@ impl Law {
             torque[joint] += size;
         }
         match *self {
-            Self::Asymmetric { joint, size, width } => torque[joint] += size * sign(v(joint), width).max(0.0),
-            Self::Stribeck { joint, size, speed, exponent } => {
-                let fade = (-(v(joint).abs() / speed).powf(exponent)).exp();
-                torque[joint] += size * sign(v(joint), 0.15 * speed) * fade;
+            Self::Asymmetric { joint, size, width, by_speed } => {
+                let there = v(joint).max(0.0);
+                torque[joint] += size * ((1.0 - by_speed) * sign(v(joint), width).max(0.0) + by_speed * there);
             }
-            Self::Presliding { joint, size, travel, width, parallel } => {
-                let bristles = if parallel { vec![(0.6, 0.5 * travel), (0.4, 2.0 * travel)] } else { vec![(1.0, travel)] };
-                let mut held = 0.0;
-                for (z, (share, travel)) in past.bristle.iter_mut().zip(bristles) {
-                    // Exact for a constant velocity in the step.
-                    let moved = (v(joint) * now.step).abs() / travel;
-                    *z = v(joint).signum() + (*z - v(joint).signum()) * (-moved).exp();
-                    held += share * *z;
+            Self::Stribeck { joint, size, speed, fall } => {
+                torque[joint] += size * sign(v(joint), 0.15 * speed) * fall.at(v(joint).abs() / speed);
+            }
+            Self::Presliding { joint, size, travel, width, bristles } => {
+                let mut kept = 0.0;
+                for (z, (share, part)) in past.bristle.iter_mut().zip(bristles.parts()) {
+                    let moved = v(joint) * now.step / (part * travel);
+                    if moved != 0.0 {
+                        *z = bristles.bent(*z, moved);
+                    }
+                    kept += share * *z;
                 }
-                torque[joint] += size * (held - sign(v(joint), width));
+                torque[joint] += size * (kept - sign(v(joint), width));
             }
             Self::Load { joint, share, exponent, width } => {
                 let load = now.rigid[joint].abs().powf(exponent);
                 torque[joint] += share * load * sign(v(joint), width);
             }
-            Self::Warmup { joint, share, time } => torque[joint] += share * (-now.time / time).exp() * now.friction[joint],
+            Self::Warmup { joint, share, time, slow } => {
+                let cold = if slow { 1.0 / (1.0 + now.time / time) } else { (-now.time / time).exp() };
+                torque[joint] += share * cold * now.friction[joint];
+            }
             Self::WristCoupling { joint, by, ratio, viscous, coulomb, width } => {
                 let x = v(joint) + ratio * v(by);
                 let drag = viscous * x + coulomb * sign(x, width);
@@ -130,8 +209,14 @@ impl Law {
             }
             Self::Rotor { joint, inertia } => torque[joint] += inertia * now.state.a[joint],
             Self::Offset { joint, size } => torque[joint] += size,
-            Self::Ripple { joint, size, order, phase } => torque[joint] += size * (order * q(joint) + phase).sin(),
-            Self::Spring { joint, size, zero } => torque[joint] -= size * (q(joint) - zero).sin(),
+            Self::Ripple { joint, size, order, phase, overtone } => {
+                let turn = order * q(joint) + phase;
+                torque[joint] += size * (turn.sin() + overtone * (2.0 * turn + phase).sin());
+            }
+            Self::Spring { joint, size, zero, gas } => {
+                let bend = (q(joint) - zero).sin();
+                torque[joint] -= size * bend * (1.0 + gas * bend);
+            }
             Self::Cable { joint, stiffness, zero, hardening } => {
                 let bend = q(joint) - zero;
                 torque[joint] += stiffness * bend * (1.0 + hardening * bend * bend);
@@ -144,20 +229,16 @@ impl Law {
                 past.swing = [x + now.step * dx, dx];
                 torque[joint] += past.swing[0] - drive;
             }
-            Self::Backlash { joint, size, time } => {
-                if v(joint).abs() > 0.01 && v(joint).signum() != past.direction {
-                    past.since = if past.direction == 0.0 { f64::INFINITY } else { 0.0 };
-                    past.direction = v(joint).signum();
-                }
-                let since = past.since / time;
-                if since.is_finite() {
-                    torque[joint] += past.direction * size * since * (1.0 - since).exp();
-                    past.since += now.step;
-                }
+            Self::Backlash { joint, size, time, wave } => {
+                torque[joint] += size * past.knock(v(joint), time, wave, now.step);
             }
             Self::Meshing { joint, by, size, order } => {
                 torque[joint] += size * (order * q(by)).sin() * (2.0 * q(joint)).cos();
             }
+            Self::SpeedCurve { joint, size, width, ref waves } => {
+                torque[joint] += size * sign(v(joint), width) * curve(waves, v(joint).abs());
+            }
+            Self::AngleCurve { joint, size, ref waves } => torque[joint] += size * curve(waves, q(joint)),
             // Rigid ones are in the bodies; the recording shifts and scales; friction was added above.
             _ => {}
         }

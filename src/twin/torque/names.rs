@@ -1,6 +1,6 @@
 //! What effects are called, where they sit, and which have another form than the usual formula.
 
-use super::law::Law;
+use super::law::{Bristles, Fall, Law};
 
 impl Law {
     /// Its canonical name.
@@ -29,7 +29,7 @@ impl Law {
             Self::LinkCentre { .. } => "link_com",
             Self::LinkInertia { .. } => "link_inertia",
             Self::Tilt { .. } => "gravity_direction",
-            Self::Meshing { .. } => "unknown",
+            Self::Meshing { .. } | Self::SpeedCurve { .. } | Self::AngleCurve { .. } => "unknown",
         }
     }
 
@@ -52,7 +52,9 @@ impl Law {
             | Self::Cable { joint, .. }
             | Self::Elasticity { joint, .. }
             | Self::Backlash { joint, .. }
-            | Self::Meshing { joint, .. } => Some(joint),
+            | Self::Meshing { joint, .. }
+            | Self::SpeedCurve { joint, .. }
+            | Self::AngleCurve { joint, .. } => Some(joint),
             _ => None,
         }
     }
@@ -71,16 +73,32 @@ impl Law {
         }
     }
 
-    /// Whether it can have another form than the usual formula.
-    pub(super) fn has_other_form(&self) -> bool {
-        matches!(
-            self,
-            Self::Stribeck { .. }
-                | Self::Presliding { .. }
-                | Self::Load { .. }
-                | Self::Cable { .. }
-                | Self::Payload { .. }
-                | Self::Meshing { .. }
-        )
+    /// Whether it has another form than the usual formula.
+    pub(super) fn is_of_another_form(&self) -> bool {
+        match *self {
+            Self::Viscous { exponent, .. } | Self::Load { exponent, .. } => exponent != 1.0,
+            Self::Asymmetric { by_speed, .. } => by_speed != 0.0,
+            Self::Stribeck { fall, .. } => fall != Fall::Exponential(1.0),
+            Self::Presliding { bristles, .. } => bristles != Bristles::One,
+            Self::Warmup { slow, .. } => slow,
+            Self::TorqueConstant { half, .. } => half.is_finite(),
+            Self::Ripple { overtone, .. } => overtone != 0.0,
+            Self::Spring { gas, .. } => gas != 0.0,
+            Self::Cable { hardening, .. } => hardening != 0.0,
+            Self::Backlash { wave, .. } => wave,
+            Self::Contact { held, .. } => held,
+            Self::Payload { centre, .. } => centre != [0.0; 3],
+            _ => self.name() == "unknown",
+        }
+    }
+
+    /// What it may be called besides, at its place: a curve that no library has is also one of its kind.
+    pub(super) fn kin(&self) -> &'static [&'static str] {
+        match self {
+            Self::Viscous { exponent, .. } if *exponent != 1.0 => &["unknown", "stribeck_friction"],
+            Self::SpeedCurve { .. } => &["stribeck_friction"],
+            Self::AngleCurve { .. } => &["torque_ripple"],
+            _ => &[],
+        }
     }
 }

@@ -17,6 +17,8 @@ enum Form {
     Sines { middle: Vec<f64>, waves: Vec<Vec<[f64; 3]>> },
     /// Where each move begins and how long it takes, s, from and to.
     Moves(Vec<Leg>),
+    /// States at even steps, s.
+    Given(f64, Vec<JointState>),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +75,11 @@ impl Path {
         Self { duration, form: Form::Moves(legs) }
     }
 
+    /// A motion in even steps, s.
+    pub(super) fn given(step: f64, states: Vec<JointState>) -> Self {
+        Self { duration: step * states.len() as f64, form: Form::Given(step, states) }
+    }
+
     /// The joints at a time from the stretch's begin, s.
     pub(super) fn at(&self, time: f64) -> JointState {
         match &self.form {
@@ -97,6 +104,7 @@ impl Path {
                 let leg = legs.iter().rfind(|leg| leg.start <= time).or(legs.first());
                 leg.map_or_else(JointState::default, |leg| leg.at(time))
             }
+            Form::Given(step, states) => states[((time / step).round() as usize).min(states.len() - 1)].clone(),
         }
     }
 

@@ -31,7 +31,7 @@ pub struct TorqueRows {
 
 impl TorqueCase {
     /// The bodies as they are: off within the tolerance, and by those laws that change bodies.
-    fn true_machine<'a>(&self, laws: impl Iterator<Item = &'a Law>) -> Machine {
+    pub(super) fn true_machine<'a>(&self, laws: impl Iterator<Item = &'a Law>) -> Machine {
         let mut machine = self.scattered.clone();
         for law in laws {
             law.change(&mut machine);
@@ -66,13 +66,16 @@ impl TorqueCase {
                 laws.iter().zip(&mut past).for_each(|(law, past)| law.add(&now, past, &mut torque));
                 for law in &laws {
                     match law {
-                        Law::Contact { start, end, force } if (*start..*end).contains(&(begin + time)) => {
-                            let rises = std::f64::consts::PI * (begin + time - start) / (end - start);
-                            let push = force.map(|f| f * rises.sin());
+                        Law::Contact { start, end, force, held } if (*start..*end).contains(&(begin + time)) => {
+                            let part = (begin + time - start) / (end - start);
+                            let wave = (std::f64::consts::PI * part).sin();
+                            let push = force.map(|f| f * if *held { (3.0 * wave).min(1.0) } else { wave });
                             let against = machine.against(&state.q, push);
                             torque.iter_mut().zip(against).for_each(|(torque, against)| *torque += against);
                         }
-                        Law::TorqueConstant { joint, share } => torque[*joint] *= 1.0 + share,
+                        Law::TorqueConstant { joint, share, half } => {
+                            torque[*joint] *= 1.0 + share / (1.0 + torque[*joint].abs() / half);
+                        }
                         _ => {}
                     }
                 }

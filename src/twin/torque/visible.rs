@@ -2,7 +2,7 @@
 //! effects have absorbed what they can; and which other names would say the same.
 
 use super::draw::TorqueCase;
-use super::law::{Law, Moment};
+use super::law::{Fall, Law, Moment};
 use super::record::{LASTS, TorqueRows};
 use super::rigid::Machine;
 
@@ -32,27 +32,37 @@ struct Columns<'a> {
 }
 
 impl TorqueCase {
-    /// Of each law; `rows` are those with all of them.
+    /// Of each law; `rows` are those with all of them. Other names are looked for of those beside the friction of all joints alone.
     pub(super) fn visible(&self, rows: &TorqueRows) -> Vec<Visible> {
         let all: Vec<usize> = (0..self.laws.len()).collect();
         let columns = Columns::new(self, rows);
-        let without = |index: usize| {
+        let effect = |index: usize| {
+            if index < self.common {
+                return columns.of_law(&self.laws[index]);
+            }
             let others: Vec<usize> = all.iter().copied().filter(|other| *other != index).collect();
             let less = self.rows(&others);
             columns.of(rows.torque.iter().zip(&less.torque).map(|(with, less)| with - less))
         };
-        let effects: Vec<Vec<f64>> = all.iter().map(|index| without(*index)).collect();
+        let effects: Vec<Vec<f64>> = all.iter().map(|index| effect(*index)).collect();
         let base = columns.inertial();
-        let rivals = columns.rivals();
+        // Masses cost what their tolerance says: their columns are in standard deviations, with 1 on the diagonal.
+        let beside = |index: Option<usize>| -> Vec<(&[f64], f64)> {
+            let others = effects.iter().enumerate().filter(|(other, _)| Some(*other) != index).map(|(_, c)| c.as_slice());
+            base.iter().map(|c| (c.as_slice(), 1.0)).chain(others.map(|c| (c, 0.0))).collect()
+        };
+        let whole = Space::new(&beside(None));
+        let rivals = if self.common < self.laws.len() { columns.rivals() } else { Vec::new() };
         let seen = |index: usize| {
-            let others = effects.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, column)| column.as_slice());
-            // Masses cost what their tolerance says: their columns are in standard deviations, with 1 on the diagonal.
-            let held: Vec<(&[f64], f64)> = base.iter().map(|c| (c.as_slice(), 1.0)).chain(others.map(|c| (c, 0.0))).collect();
-            let space = Space::new(&held);
-            let own = space.projected(&effects[index]);
-            let (l, before) = (space.dot(&own, &own), square(&effects[index]));
+            let (l, before) = (whole.alone(base.len() + index), square(&effects[index]));
+            if index < self.common {
+                return Visible { l, before, same: Vec::new() };
+            }
             let law = &self.laws[index];
             let known = (law.name().to_string(), law.place());
+            let space = Space::new(&beside(Some(index)));
+            let own = space.projected(&effects[index]);
+            let l = space.dot(&own, &own);
             let says_the_same =
                 |rival: &&(String, String, Vec<Vec<f64>>)| space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l);
             let same = rivals.iter().filter(says_the_same).map(|(name, place, _)| (name.clone(), place.clone()));
@@ -124,7 +134,7 @@ impl<'a> Columns<'a> {
             for law in per_joint(joint) {
                 add(&law, vec![self.of_law(&law)]);
             }
-            let law = Law::TorqueConstant { joint, share: 0.0 };
+            let law = Law::TorqueConstant { joint, share: 0.0, half: f64::INFINITY };
             let own = self.rows.torque.iter().enumerate().map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
             if !self.case.sensors {
                 add(&law, vec![self.of(own)]);
@@ -172,15 +182,15 @@ fn per_joint(joint: usize) -> Vec<Law> {
     vec![
         Law::Viscous { joint, size: 1.0, exponent: 1.0 },
         Law::Coulomb { joint, size: 1.0, width },
-        Law::Asymmetric { joint, size: 1.0, width },
-        Law::Stribeck { joint, size: 1.0, speed: 0.05, exponent: 1.0 },
-        Law::Stribeck { joint, size: 1.0, speed: 0.1, exponent: 1.0 },
+        Law::Asymmetric { joint, size: 1.0, width, by_speed: 0.0 },
+        Law::Stribeck { joint, size: 1.0, speed: 0.05, fall: Fall::Exponential(1.0) },
+        Law::Stribeck { joint, size: 1.0, speed: 0.1, fall: Fall::Exponential(1.0) },
         Law::Load { joint, share: 1.0, exponent: 1.0, width },
         Law::Rotor { joint, inertia: 1.0 },
         Law::Offset { joint, size: 1.0 },
         Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: 0.0 },
-        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2 },
+        Law::Spring { joint, size: 1.0, zero: 0.0, gas: 0.0 },
+        Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2, gas: 0.0 },
     ]
 }
 
@@ -222,6 +232,16 @@ impl<'a> Space<'a> {
             factor.push(row);
         }
         Self { held: held.iter().map(|(column, _)| *column).collect(), factor }
+    }
+
+    /// What a held column leaves beside all others: the inverse of its diagonal in the normal matrix's inverse.
+    fn alone(&self, index: usize) -> f64 {
+        let mut solved: Vec<f64> = vec![0.0; index];
+        for row in &self.factor[index..] {
+            let unit = if solved.len() == index { 1.0 } else { 0.0 };
+            solved.push((unit - product(&row[..solved.len()], &solved)) / row[solved.len()]);
+        }
+        1.0 / square(&solved)
     }
 
     fn projected(&self, column: &[f64]) -> Projected {

@@ -51,7 +51,7 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     assert!(report["parameters"].as_array().expect("rows").iter().any(|row| row["name"] == "joint_offset.j2"));
     let page = read("report.html");
     assert!(
-        page.contains("poor (withdrawn)") && page.contains("`poor` is withdrawn and `identify` used instead"),
+        page.contains("poor</span> <span>(withdrawn)</span>") && page.contains("`poor` is withdrawn and `identify` used instead"),
         "the page is silent"
     );
     for model in ["pipeline.yaml", "HEAD"] {

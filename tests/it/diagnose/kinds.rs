@@ -22,6 +22,8 @@ const SIGMA_TILT: f64 = 1.5e-5;
 /// m
 const SIGMA_WIRE: f64 = 1.5e-5;
 const SIGMA_POINT: f64 = 4e-5;
+/// Of focal lengths: an arc second.
+const SIGMA_IMAGE: f64 = 5e-6;
 /// m: how far points stand apart that show how the last body is turned.
 const APART: f64 = 0.5;
 
@@ -157,6 +159,22 @@ impl Recorded {
         self.read(readings)
     }
 
+    /// Seen by one camera some way off, which is the recording's origin.
+    fn with_a_camera(self) -> Self {
+        let centre = self.point.iter().sum::<Vector3<f64>>() / self.point.len() as f64;
+        let away = Vector3::new(4.0, -4.0, 3.0);
+        let along = -away.normalize();
+        let right = along.cross(&Vector3::z()).normalize();
+        let down = along.cross(&right);
+        let image = |row: usize, axis: usize| {
+            let point = self.point[row] - centre - away;
+            [right, down][axis].dot(&point) / along.dot(&point) + SIGMA_IMAGE * normal(30_000 + 2 * row + axis)
+        };
+        let values = (0..self.point.len()).flat_map(|row| [0, 1].map(|axis| image(row, axis))).collect();
+        let sigma = vec![SIGMA_IMAGE; self.point.len()];
+        self.read(Readings { kind: "planar", width: 2, values, sigma, anchor: None })
+    }
+
     /// Adds points of every other row, by a coarse tracker.
     fn with_some_points(mut self) -> Self {
         for row in (0..self.point.len()).step_by(2) {
@@ -242,4 +260,12 @@ fn causes_are_named_from_points_and_distances() {
     let concealed = [gear(4, 2.0, 60.0, 10.0), spring(2, 2e-7), play(1, 50.0)];
     let said = recorded(&concealed, 240, &[], 2.0).with_wires().with_some_points().diagnosed();
     explains(&said, &named(&[("gear_cyclic", "joint 4"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
+}
+
+#[test]
+fn causes_are_named_from_the_images_of_one_camera_alone() {
+    let concealed = [gear(3, 2.0, 60.0, 40.0), spring(2, 2e-7), play(1, 50.0)];
+    let said = recorded(&concealed, 480, &[], 0.0).with_a_camera().diagnosed();
+    explains(&said, &named(&[("gear_cyclic", "joint 3"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
+    assert_eq!(said.dimension, Dimension::Angle);
 }

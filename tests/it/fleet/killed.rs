@@ -1,7 +1,7 @@
 //! A fleet killed three times ends as an undisturbed one, and nothing recorded is computed again.
 
 use super::{file, fleet, recordings, run, tables};
-use crate::held::{self, Held};
+use crate::held_locks::{self, Held};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
@@ -20,7 +20,7 @@ pub fn records(store: &Path, name: &str) -> Vec<PathBuf> {
 /// The claims on the last `count` robots that are recorded in a store where nothing was disturbed, taken in another store.
 pub fn hold(undisturbed: &Path, store: &Path, name: &str, count: usize) -> Vec<Held> {
     let keys = records(undisturbed, name).into_iter().rev().map(|path| path.file_stem().unwrap().to_string_lossy().into_owned());
-    let held: Vec<Held> = keys.take(count).map(|key| held::robot(store, name, &key)).collect();
+    let held: Vec<Held> = keys.take(count).map(|key| held_locks::robot(store, name, &key)).collect();
     assert_eq!(held.len(), count);
     held
 }
@@ -42,7 +42,7 @@ fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
     let mut stood: Vec<(PathBuf, std::time::SystemTime)> = Vec::new();
     for kill in 1..=3 {
         let mut child = fleet("run", &file, &store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        held::until(&mut child, || records(&store, "line").len() >= kill * ROBOTS / 5);
+        held_locks::until(&mut child, || records(&store, "line").len() >= kill * ROBOTS / 5);
         std::thread::sleep(Duration::from_millis(7 * kill as u64));
         child.kill().unwrap();
         child.wait().unwrap();

@@ -86,6 +86,7 @@ impl Truth {
         let row: &dyn Fn(usize) -> Vec<f64> = match kind {
             "orientation" => &|row| rotations[row].iter().copied().collect(),
             "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
+            "planar" => &|row| [1, 2].map(|axis: usize| -data.position[row][axis] / data.position[row].x).to_vec(),
             "distance" => &|row| vec![(data.position[row] - anchor).norm()],
             other => panic!("say what `{other}` measures"),
         };

@@ -55,6 +55,21 @@ fn all_conventions_of_orientation_are_one_rotation() {
 }
 
 #[test]
+fn images_of_a_camera_need_their_noise_and_no_unit() {
+    let lines = "      image_x: {column: u}\n      image_y: {column: v, unit: \"1\"}\n";
+    let desk = || Desk::default().with("a.csv", "q1,q2,u,v\n1,2,0.25,-0.125\n3,4,12,0\n5,6,0.5,\n7,8,0,1e-3\n");
+    let yaml = with(&format!("{lines}      sigma_image: {{value: 5.0e-6}}\n"));
+    let taken = take(&desk(), &yaml, robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.readings["image_x"], [0.25, 0.0]);
+    assert_eq!(taken.recording.readings["image_y"], [-0.125, 1e-3]);
+    assert_eq!(taken.recording.readings["sigma_image"], [5e-6; 2]);
+    let details: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.as_str()).collect();
+    assert!(details[0].starts_with("u: `12`; allowed: -10 to 10") && details[1..] == ["v is blank"], "{details:?}");
+    let faults: Vec<String> = settings(&with(lines)).check().iter().map(ToString::to_string).collect();
+    assert!(faults.iter().any(|fault| fault.contains("`image_x`, `image_y` and `sigma_image` go together")), "{faults:?}");
+}
+
+#[test]
 fn distances_need_no_point_and_half_an_orientation_is_refused() {
     let distance =
         "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";

@@ -48,7 +48,7 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
     let output = calib(folder.path(), &["init", "more", "--data", "notes.csv", "notes.csv", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, or recordings that have joints and points each"), "{told}");
+    assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each of several reflectors, or recordings that have joints and points each"), "{told}");
     assert!(!folder.path().join("more").exists());
 }
 
@@ -81,4 +81,71 @@ fn a_grid_and_a_check_set_are_two_recordings_of_which_the_second_judges() {
         "point_id: {column: \"Punkt\"}",
     ]);
     made.runs(60);
+}
+
+#[test]
+fn several_reflectors_from_several_files_are_targets_of_the_same_poses() {
+    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| format!("P{k};{}", joints(k, ";")));
+    let list = |by: usize| table("Punkt;X;Y;Z", |k| format!("P{k};{}", point(k + by, ";")));
+    // In any order: which file has the joints is seen.
+    let made = made(&[
+        ("smr_A.csv", list(0).into()),
+        ("controller.csv", controller.into()),
+        ("smr_B.csv", list(3).into()),
+        ("smr_C.csv", list(7).into()),
+    ]);
+    made.has(&[
+        "target: {value: \"A\"}   # CHECK: which reflector it was, by the file's name",
+        "join: {by: id}          # by the point's name",
+        "later:                  # CHECK: the other reflectors, measured in the same poses",
+        "- {files: [\"controller.csv\", \"smr_B.csv\"], target: \"B\"}",
+        "- {files: [\"controller.csv\", \"smr_C.csv\"], target: \"C\"}",
+    ]);
+    made.runs(90);
+}
+
+const CELL: &str = r#"<robot name="cell"><link name="world"/><link name="carriage"/><link name="arm"/><link name="holder"/>
+<joint name="rail" type="prismatic"><parent link="world"/><child link="carriage"/><axis xyz="0 1 0"/><limit lower="-2" upper="2"/></joint>
+<joint name="turn" type="revolute"><parent link="carriage"/><child link="arm"/><axis xyz="0 0 1"/><limit lower="-3" upper="3"/></joint>
+<joint name="fix" type="fixed"><parent link="arm"/><child link="holder"/><origin xyz="0.5 0 0.2"/></joint></robot>"#;
+
+#[test]
+fn the_chain_of_a_urdf_is_read_from_its_first_link_with_joints_that_slide() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = table("Punkt,J1_mm,J2_deg,X,Y,Z", |k| format!("P{k},{},{},{}", 40 * k, 3 * k, point(k, ",")));
+    std::fs::write(folder.path().join("data.csv"), data).expect("a file");
+    std::fs::write(folder.path().join("cell.urdf"), CELL).expect("a file");
+    let told = |arguments: &[&str]| {
+        let output = calib(folder.path(), arguments, "");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let start = ["init", ".", "--data", "data.csv", "--urdf", "cell.urdf", "--tip"];
+    assert_eq!(told(&[&start[..], &["holder"]].concat()), (Some(0), String::new()));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    assert!(read("robot.yaml").contains("urdf: {base: \"world\", tip: \"holder\"}"), "{}", read("robot.yaml"));
+    let pipeline = read("pipeline.yaml");
+    assert!(pipeline.contains("q: {columns: [\"J1_mm\", \"J2_deg\"], unit: deg, linear_unit: mm}"), "{pipeline}");
+    std::fs::remove_file(folder.path().join("robot.yaml")).expect("a file");
+    std::fs::remove_file(folder.path().join("pipeline.yaml")).expect("a file");
+    let (code, said) = told(&[&start[..], &["carriage"]].concat());
+    assert_eq!(code, Some(2));
+    assert!(said.contains("--tip: the chain from `world` to `carriage` has 1 joint, the recording 2"), "{said}");
+    let (code, said) = told(&[&start[..], &["tool0"]].concat());
+    assert!(code == Some(2) && said.contains("no link `tool0`") && said.contains("carriage, holder, world"), "{said}");
+}
+
+#[test]
+fn quaternions_are_orientations_to_take_in_and_u95_is_two_standard_deviations() {
+    let controller = table("Punkt;A1;A2;A3;A4;A5;A6", |k| format!("P{k};{}", joints(k, ";")));
+    let list = table("Punkt;X;Y;Z;qw;qx;qy;qz;U95 X;U95 Y;U95 Z", |k| format!("P{k};{};1;0;0;0;0.03;0.03;0.04", point(k, ";")));
+    let made = made(&[("controller.csv", controller.into()), ("tracker.csv", list.into())]);
+    made.says(&[
+        "# orientation: {quaternion: [\"qw\", \"qx\", \"qy\", \"qz\"]}   # CHECK: full poses",
+        "# sigma_orientation: {value: 30, unit: arcsec}",
+        "# u95_x: {column: \"U95 X\", unit: mm}   # CHECK: two standard deviations, if rows are to be weighted by it",
+    ]);
+    // The lines taken in are understood.
+    let taken = made.pipeline.replace("# orientation:", "orientation:").replace("# sigma_orientation:", "sigma_orientation:");
+    std::fs::write(made.path().join("pipeline.yaml"), taken).expect("a file");
+    made.runs(30);
 }

@@ -1,40 +1,53 @@
-//! Recordings of the twin whose physics is concealed, diagnosed through the real command and marked.
-//!
-//! `CALIB_RECORDINGS=100 CALIB_SEED=7 cargo test --test it -- torques::concealed --nocapture` prints every recording.
+//! Recordings of the twin whose physics is concealed, diagnosed blind through the real command and marked.
 
-use super::{document, from_environment, json, mark, write};
-use calib::twin::torque::{TorqueCase, TorqueDesign};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
 
-/// Half of the effects in forms that are not the estimator's, a fifth of the recordings without any.
+fn simulate(verb: &str, out: &Path, more: &[&str]) -> Output {
+    let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/dynamics/pipeline.yaml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+    command.args(["simulate", verb, "--dynamics", "--out"]).arg(out).args(more);
+    if verb == "prove" {
+        command.args(["--pipeline", pipeline, "--quiet", "--json"]);
+    }
+    let done = command.output().expect("calib");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    done
+}
+
+/// Half of the effects in forms that are not the estimator's. More of them: `calib simulate prove --dynamics --cases 300`.
 #[test]
 fn concealed_torques_are_found_and_nulls_stay_empty() {
-    let (count, seed) = (from_environment("CALIB_RECORDINGS", 3), from_environment("CALIB_SEED", 11));
     let folder = tempfile::tempdir().expect("a folder");
-    let design = TorqueDesign { seed, nulls: 0.2, other_forms: 0.5, most: 1, seconds: 48.0, rate: 100.0 };
-    let (mut wanted, mut missed, mut misplaced, mut beside, mut exact, mut nulls, mut false_nulls) = (0, 0, 0, 0, 0, 0, 0);
-    for number in 0..count as usize {
-        let case = TorqueCase::draw(&design, number);
-        let path = folder.path().join(&case.name);
-        write(&path, &case.recording());
-        write(&path, &case.truth());
-        let want = json(path.join("want.json"));
-        let marks = mark(&want, &document(&path, &folder.path().join("store")));
-        println!("{}: of {} missed {:?}, beside {:?}", case.name, marks.wanted, marks.missed, marks.beside);
-        if want["effects"].as_array().is_some_and(Vec::is_empty) {
-            nulls += 1;
-            false_nulls += usize::from(!marks.beside.is_empty());
-        }
-        exact += usize::from(marks.missed.is_empty() && marks.beside.is_empty());
-        wanted += marks.wanted;
-        missed += marks.missed.len();
-        misplaced += marks.misplaced;
-        beside += marks.beside.len();
-        std::fs::remove_dir_all(&path).expect("our own folder");
-    }
-    println!(
-        "{count} recordings, {exact} exact; of {wanted} plain effects {missed} missed, {misplaced} of them at no accepted place; {beside} \
-         named beside; {false_nulls} of {nulls} nulls with a name"
-    );
-    assert!(10 * missed <= wanted, "{missed} of {wanted} plain effects are missed");
-    assert!(5 * beside <= wanted.max(5), "{beside} names beside {wanted} effects");
+    let done = simulate("prove", &folder.path().join("set"), &["--seed", "11", "--cases", "4", "--nulls", "0.25"]);
+    let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+    assert_eq!((&board["recordings"], &board["without_verdict"]), (&4.into(), &serde_json::json!([])));
+    let alarms = &board["shares"][0]["share"];
+    assert_eq!((alarms["count"].as_u64(), alarms["of"].as_u64()), (Some(0), Some(1)), "false alarms: {board:#}");
+    let place = &board["places"]["all"]["place"];
+    assert!(place["of"].as_u64() >= Some(2) && place["count"] == place["of"], "places: {board:#}");
+}
+
+#[test]
+fn a_seed_gives_the_same_recordings_of_torques_on_one_and_two_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let seals = ["1", "2"].map(|jobs| {
+        let out = folder.path().join(jobs);
+        simulate("conceal", &out, &["--cases", "3", "--seconds", "16", "--rate", "20", "--open", "0.4", "--jobs", jobs]);
+        std::fs::read_to_string(out.join("seal.json")).expect("a seal")
+    });
+    // The hash of every file is in it.
+    assert_eq!(seals[0], seals[1]);
+    assert_eq!(seals[0].matches("recording.csv").count(), 3);
+}
+
+#[test]
+fn options_of_points_are_refused_of_torques() {
+    let done = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(["simulate", "conceal", "--dynamics", "--out", "never", "--layout", "path"])
+        .output()
+        .expect("calib");
+    assert_eq!(done.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&done.stderr).contains("--layout"), "{}", String::from_utf8_lossy(&done.stderr));
 }

@@ -1,7 +1,7 @@
 //! Bad recordings of torques: each has a clear answer with file, line or place, and is not diagnosed.
 
-use super::{diagnose, write};
-use calib::twin::torque::{TorqueCase, TorqueDesign};
+use super::{diagnose, nothing, write};
+use calib::twin::torque::TorqueCase;
 use std::path::Path;
 
 struct Sheet {
@@ -48,8 +48,8 @@ impl Sheet {
 
 /// An arm with motor currents.
 fn case() -> (TorqueCase, Sheet) {
-    let design = TorqueDesign { seed: 5, nulls: 1.0, other_forms: 0.0, most: 0, seconds: 32.0, rate: 50.0 };
-    let case = (0..20).map(|number| TorqueCase::draw(&design, number)).find(|case| case.robot.name == "compact6").expect("one");
+    let case =
+        (0..20).map(|number| TorqueCase::draw(&nothing(5), number)).find(|case| case.robot.name == "compact6").expect("one");
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }

@@ -4,6 +4,7 @@
 //! With x ~ N(0, a^2 V): ln E(a) = 1/2 sum_k [ z_k^2 a^2 s_k / (1 + a^2 s_k) - ln(1 + a^2 s_k) ], where s and z are eigenvalues and projected
 //! gradient of V^1/2 G V^1/2 (computed on its tridiagonal form); the amplitude `a` is integrated over a logarithmic grid, since the largest evidence alone is biased upwards.
 
+use crate::diagnose::pool::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Amplitudes, rms motion of the tool in m: below the first no instrument sees it, above the last it is a wrong set-up.
@@ -41,16 +42,11 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, variances: 
     let roots: Vec<f64> = kept.iter().map(|k| variances[*k].sqrt()).collect();
     let count = roots.len();
     let scaled = DMatrix::from_fn(count, count, |i, j| roots[i] * gram[(kept[i], kept[j])] * roots[j]);
-    let along = DVector::from_fn(count, |i, _| roots[i] * gradient[kept[i]]);
+    let mut along = DVector::from_fn(count, |i, _| roots[i] * gradient[kept[i]]);
     if scaled.trace().is_nan() || scaled.trace() <= 0.0 {
         return GroupEvidence::NONE;
     }
-    let (diagonal, beside, along) = if count == 1 {
-        (vec![scaled[(0, 0)]], Vec::new(), along)
-    } else {
-        let (turned, diagonal, beside) = scaled.symmetric_tridiagonalize().unpack();
-        (diagonal.as_slice().to_vec(), beside.as_slice().to_vec(), turned.tr_mul(&along))
-    };
+    let (diagonal, beside) = tridiagonal(scaled, along.as_mut_slice());
     let mut logs = [0.0; AMPLITUDES];
     for (log, amplitude) in logs.iter_mut().zip(amplitudes()) {
         *log = at_amplitude(amplitude * amplitude, &diagonal, &beside, &along);
@@ -58,6 +54,39 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, variances: 
     let best = (0..AMPLITUDES).max_by(|a, b| logs[*a].total_cmp(&logs[*b])).unwrap_or(0);
     let amplitude = amplitudes().nth(best).unwrap_or(SMALLEST);
     GroupEvidence { log: log_mean(&logs), amplitude }
+}
+
+/// The diagonal and what is beside it of a symmetric matrix brought to tridiagonal form by reflections (Householder, 1958), which turn
+/// `along`, too.
+fn tridiagonal(mut matrix: DMatrix<f64>, along: &mut [f64]) -> (Vec<f64>, Vec<f64>) {
+    let count = matrix.nrows();
+    let (mut diagonal, mut beside) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let mut image = vec![0.0; count];
+    for k in 0..count {
+        diagonal.push(matrix[(k, k)]);
+        let (done, rest) = matrix.as_mut_slice().split_at_mut((k + 1) * count);
+        let (mirror, image) = (&mut done[k * (count + 1) + 1..], &mut image[k + 1..]);
+        let Some(first) = mirror.first().copied() else { break };
+        let length = dot(mirror, mirror).sqrt();
+        beside.push(-length.copysign(first));
+        if length == 0.0 {
+            continue;
+        }
+        mirror[0] += length.copysign(first);
+        let share = 2.0 / dot(mirror, mirror);
+        for (value, column) in image.iter_mut().zip(rest.chunks(count)) {
+            *value = share * dot(&column[k + 1..], mirror);
+        }
+        let own = 0.5 * share * dot(image, mirror);
+        image.iter_mut().zip(&*mirror).for_each(|(value, by)| *value -= own * by);
+        for ((column, by), value) in rest.chunks_mut(count).zip(&*mirror).zip(&*image) {
+            let both = mirror.iter().zip(&*image);
+            column[k + 1..].iter_mut().zip(both).for_each(|(entry, (a, b))| *entry -= a * value + b * by);
+        }
+        let turn = share * dot(mirror, &along[k + 1..]);
+        along[k + 1..].iter_mut().zip(&*mirror).for_each(|(value, by)| *value -= turn * by);
+    }
+    (diagonal, beside)
 }
 
 /// ln of the evidence at a squared amplitude, of a Gram matrix T in tridiagonal form: (a^2 g' (1 + a^2 T)^-1 g - ln det (1 + a^2 T)) / 2.
@@ -112,6 +141,24 @@ mod tests {
             .collect();
         assert!((found.log - log_mean(&logs)).abs() < 1e-12);
         assert!((2e-3..8e-3).contains(&found.amplitude), "{found:?}");
+    }
+
+    #[test]
+    fn the_evidence_of_columns_that_are_not_orthogonal_is_that_of_their_covariance() {
+        // Columns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
+        let entry = |i: usize, j: usize| (((5 * i + 3 * j * j + 2 * i * j) % 11) as f64 - 5.0) * 300.0;
+        let columns = DMatrix::from_fn(9, 5, entry);
+        let residual = DVector::from_fn(9, |i, _| ((7 * i) % 5) as f64 - 1.5);
+        let variances = [1.0, 0.5, 0.25, 2.0, 1.5];
+        let found = evidence(&columns.tr_mul(&columns), &columns.tr_mul(&residual), &variances);
+        let at = |amplitude: f64| {
+            let prior = DMatrix::from_diagonal(&DVector::from_row_slice(&variances)) * (amplitude * amplitude);
+            let covariance = DMatrix::identity(9, 9) + &columns * prior * columns.transpose();
+            let solved = covariance.clone().lu().solve(&residual).expect("a covariance");
+            0.5 * (residual.norm_squared() - residual.dot(&solved) - covariance.determinant().ln())
+        };
+        let logs: Vec<f64> = amplitudes().map(at).collect();
+        assert!((found.log - log_mean(&logs)).abs() < 1e-8, "{} {}", found.log, log_mean(&logs));
     }
 
     #[test]

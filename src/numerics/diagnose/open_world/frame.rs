@@ -78,11 +78,13 @@ impl<'a> ProjectedRows<'a> {
 
     /// A form of the list or of the model.
     pub fn block(&self, form: &Form) -> ProjectedColumns {
-        self.of_columns(self.view.problem.motions_by(form))
+        let (columns, square) = self.projected(self.view.problem.motions_by(form));
+        self.with_products(columns, square)
     }
 
-    /// A motion along the functions of a row in `values`, one after another: all products of a direction and a function.
-    pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> ProjectedColumns {
+    /// Columns of a motion along the functions of a row in `values`, one after another, as they are before [`ProjectedRows::projected`]:
+    /// all products of a direction and a function.
+    pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> Vec<f64> {
         let rows = self.residual.len();
         let mut raw = vec![0.0; rows * directions.len() * values.len()];
         for ((direction, value), column) in
@@ -92,7 +94,7 @@ impl<'a> ProjectedRows<'a> {
                 self.view.problem.readings_of(i).for_each(|line| column[line] = direction[line] * value);
             }
         }
-        self.of_columns(raw)
+        raw
     }
 
     /// Whitened motions of the tool by each direction of a motion.
@@ -105,13 +107,17 @@ impl<'a> ProjectedRows<'a> {
         self.view.problem.values(of)
     }
 
-    fn of_columns(&self, mut raw: Vec<f64>) -> ProjectedColumns {
+    /// Columns with geometry projected off, and the mean squares of what they were.
+    pub fn projected(&self, mut raw: Vec<f64>) -> (DMatrix<f64>, Vec<f64>) {
         let rows = self.residual.len();
         let square = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
         raw.chunks_mut(rows).for_each(|column| self.view.problem.innovate(column));
         project(self.base.as_ref(), &mut raw);
-        let count = raw.len() / rows;
-        let columns = DMatrix::from_vec(rows, count, raw);
+        (DMatrix::from_vec(rows, raw.len() / rows, raw), square)
+    }
+
+    /// Projected columns of a group with their products.
+    pub fn with_products(&self, columns: DMatrix<f64>, square: Vec<f64>) -> ProjectedColumns {
         let gram = product(view(&columns), view(&columns));
         let gradient = self.along(view(&columns));
         ProjectedColumns { columns, square, products: GroupProducts { gram, gradient } }

@@ -1,12 +1,13 @@
 //! The free form of a place: groups that join one after another while each pays for itself.
 
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
-use super::frame::{ProjectedColumns, ProjectedRows, product, view};
+use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows};
 use super::groups::{FreeGroup, GroupColumns};
 use super::pairs::pairs;
-use super::state::KnownCauses;
+use super::state::{AskedGroup, CauseColumns, KnownCauses};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Groups of a place at most.
 const GROUPS: usize = 4;
@@ -14,6 +15,8 @@ const GROUPS: usize = 4;
 const PAYS: f64 = 1.0;
 /// How often the number of a group's variable is halved in its step.
 const LEVELS: i32 = 4;
+/// Columns of groups that are projected at once.
+const COLUMNS: usize = 128;
 /// Groups whose shorter lengths are looked at.
 const CLOSER: usize = 10;
 
@@ -36,114 +39,142 @@ pub(super) struct FreeForm {
     pub gain: f64,
 }
 
-/// The groups of a place with their columns.
+/// A group with what its evidence needs.
+struct SeenGroup {
+    group: FreeGroup,
+    block: ProjectedColumns,
+    /// Prior variances of its columns, a list a length.
+    variances: Vec<Vec<f64>>,
+    /// Products of the columns of the model's causes with its own.
+    known: DMatrix<f64>,
+}
+
+impl SeenGroup {
+    fn asked(&self) -> AskedGroup<'_> {
+        AskedGroup { products: &self.block.products, known: &self.known, columns: &self.block.columns }
+    }
+
+    fn evidence(&self, seen: &GroupProducts, length: usize) -> GroupEvidence {
+        evidence(&seen.gram, &seen.gradient, &self.variances[length])
+    }
+}
+
+/// The groups of a place.
+#[derive(Clone)]
 pub(super) struct PlaceGroups {
     pub place: Place,
-    groups: Vec<FreeGroup>,
-    blocks: Vec<ProjectedColumns>,
-    variances: Vec<Vec<Vec<f64>>>,
-    /// GroupProducts of the columns of the model's causes with those of each.
-    known: Vec<DMatrix<f64>>,
+    groups: Vec<Arc<SeenGroup>>,
 }
 
 /// What the model's causes and the list are, beside which free forms are asked.
 pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
-    /// Columns of all causes of the model.
-    pub causes: &'f DMatrix<f64>,
+    /// All causes of the model.
+    pub causes: &'f CauseColumns,
     /// Names that are taken out of the list.
     pub without: &'f [String],
 }
 
 impl PlaceGroups {
-    /// Those of a place, with the products of two variables that what the states leave points at.
-    pub fn of(place: Place, states: &[&KnownCauses], around: &AroundGroups) -> Self {
+    /// All groups; without their columns unless these are to be `kept`: only a free form of several groups needs them, beside causes alone
+    /// products say all.
+    pub fn of(place: Place, around: &AroundGroups, kept: bool) -> Self {
         let mut columns = GroupColumns::new(around.frame);
-        let mut all = columns.of(place, around.survey);
-        all.extend(pairs(place, states, around.frame, &mut columns, around.survey));
-        let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
-        out.take(all, &mut columns, around);
+        let all = columns.of(place, around.survey);
+        let mut out = Self { place, groups: Vec::new() };
+        out.take(all, &mut columns, around, kept);
         out
     }
 
-    fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups) {
-        for group in groups {
-            if group.is_listed(around.without) {
-                continue;
+    /// With the products of two variables that what some states leave points at.
+    pub fn with_pairs(&self, states: &[&KnownCauses], around: &AroundGroups, kept: bool) -> Self {
+        let mut columns = GroupColumns::new(around.frame);
+        let mut out = self.clone();
+        let new = pairs(self.place, states, around.frame, &mut columns, around.survey);
+        out.take(new, &mut columns, around, kept);
+        out
+    }
+
+    fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups, kept: bool) {
+        let mut groups = groups.into_iter().filter(|group| !group.is_listed(around.without));
+        loop {
+            let (mut some, mut raw) = (Vec::new(), Vec::new());
+            while raw.len() < COLUMNS * around.frame.residual_rows()
+                && let Some(group) = groups.next()
+            {
+                if let Some(own) = columns.raw(&group) {
+                    some.push((group, own.len() / around.frame.residual_rows()));
+                    raw.extend(own);
+                }
             }
-            let Some(block) = columns.block(&group) else { continue };
-            self.known.push(product(view(around.causes), view(&block.columns)));
-            self.variances.push(group.variances(&block));
-            self.groups.push(group);
-            self.blocks.push(block);
+            if some.is_empty() {
+                return;
+            }
+            let (all, square) = around.frame.projected(raw);
+            let known = around.causes.with(&all);
+            let mut first = 0;
+            for (group, count) in some {
+                let own = all.columns(first, count).into_owned();
+                let mut block = around.frame.with_products(own, square[first..first + count].to_vec());
+                let (variances, known) = (group.variances(&block), known.columns(first, count).into_owned());
+                if !kept {
+                    block.columns = DMatrix::zeros(0, 0);
+                }
+                self.groups.push(Arc::new(SeenGroup { group, block, variances, known }));
+                first += count;
+            }
         }
     }
 
     /// The evidence of every group beside a state, with its best length.
     fn scan(&self, state: &KnownCauses) -> Vec<(GroupEvidence, usize)> {
-        let seen: Vec<_> = self.blocks.iter().zip(&self.known).map(|(block, known)| state.beside(block, known)).collect();
-        let of = |g: usize, length: usize| evidence(&seen[g].gram, &seen[g].gradient, &self.variances[g][length]);
+        let asked: Vec<AskedGroup> = self.groups.iter().map(|group| group.asked()).collect();
+        let seen = state.beside(&asked);
+        let of = |g: usize, length: usize| self.groups[g].evidence(&seen[g], length);
+        let lengths = |g: usize| self.groups[g].variances.len();
         // Two lengths of all, every length of the best ones.
         let first = |g: usize| {
-            let last = self.variances[g].len() - 1;
+            let last = lengths(g) - 1;
             let ends: Vec<GroupEvidence> = if last == 0 { vec![of(g, 0)] } else { vec![of(g, 0), of(g, last)] };
             (mixed(&ends), if last > 0 && ends[1].log > ends[0].log { last } else { 0 })
         };
         let mut out: Vec<(GroupEvidence, usize)> = (0..self.groups.len()).map(first).collect();
-        let mut order: Vec<usize> = (0..out.len()).filter(|g| self.variances[*g].len() > 2).collect();
+        let mut order: Vec<usize> = (0..out.len()).filter(|g| lengths(*g) > 2).collect();
         order.sort_by(|a, b| out[*b].0.log.total_cmp(&out[*a].0.log));
         for g in order.into_iter().take(CLOSER) {
-            let all: Vec<GroupEvidence> = (0..self.variances[g].len()).map(|length| of(g, length)).collect();
-            let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
-            out[g] = (GroupEvidence { log: log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>()), ..all[best] }, best);
+            out[g] = closest(&(0..lengths(g)).map(|length| of(g, length)).collect::<Vec<_>>());
         }
         out
     }
 
     /// The evidence of a group with its lengths mixed, and the best of them.
     fn closest(&self, g: usize, state: &KnownCauses) -> (GroupEvidence, usize) {
-        let seen = state.beside(&self.blocks[g], &self.known[g]);
-        let all: Vec<GroupEvidence> =
-            self.variances[g].iter().map(|variances| evidence(&seen.gram, &seen.gradient, variances)).collect();
-        let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
-        (GroupEvidence { log: log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>()), ..all[best] }, best)
+        let group = &self.groups[g];
+        let seen = state.beside_one(group.asked());
+        closest(&(0..group.variances.len()).map(|length| group.evidence(&seen, length)).collect::<Vec<_>>())
     }
 
     /// Moves the number of a group's variable to where its evidence is largest.
     fn refine(&mut self, g: usize, mut log: f64, state: &KnownCauses, columns: &mut GroupColumns, around: &AroundGroups) {
         for level in 0..LEVELS {
             let first = self.groups.len();
-            let near = columns.near(&self.groups[g], level);
-            self.take(near, columns, around);
+            let near = columns.near(&self.groups[g].group, level);
+            self.take(near, columns, around, true);
             let tried = (first..self.groups.len()).map(|other| (other, self.closest(other, state).0.log));
             let best = tried.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, other)| *other > log);
             if let Some((other, better)) = best {
                 log = better;
-                self.swap(g, other);
+                self.groups.swap(g, other);
             }
-            self.truncate(first);
+            self.groups.truncate(first);
         }
-    }
-
-    fn swap(&mut self, g: usize, other: usize) {
-        self.groups.swap(g, other);
-        self.blocks.swap(g, other);
-        self.variances.swap(g, other);
-        self.known.swap(g, other);
-    }
-
-    fn truncate(&mut self, count: usize) {
-        self.groups.truncate(count);
-        self.blocks.truncate(count);
-        self.variances.truncate(count);
-        self.known.truncate(count);
     }
 
     /// The price of a group's choice: all motions and variables alike, and within a motion that steps all times.
     fn price(&self, g: usize) -> f64 {
-        let choices: f64 = self.groups.iter().map(|group| 1.0 / group.of as f64).sum();
-        choices.max(1.0).ln() + (self.groups[g].of as f64).ln()
+        let choices: f64 = self.groups.iter().map(|seen| 1.0 / seen.group.of as f64).sum();
+        choices.max(1.0).ln() + (self.groups[g].group.of as f64).ln()
     }
 
     /// ln of the evidence of all groups as alternatives, each with its price; none whose amplitude no arm can have.
@@ -180,17 +211,24 @@ impl PlaceGroups {
             self.refine(best, scan[best].0.log, &now, &mut columns, around);
             let (found, length) = self.closest(best, &now);
             let square = found.amplitude * found.amplitude;
-            let variances: Vec<f64> = self.variances[best][length].iter().map(|variance| variance * square).collect();
-            now = now.with(around.frame, &self.blocks[best].columns, &variances);
-            let group = self.groups[best];
+            let seen = self.groups[best].clone();
+            let variances: Vec<f64> = seen.variances[length].iter().map(|variance| variance * square).collect();
+            now = now.with(around.frame, &seen.block.columns, &variances);
+            let group = seen.group;
             terms.push(FreeTerm { group, variances });
             if step == 0 {
                 let products = columns.products(&group, around.survey);
-                self.take(products, &mut columns, around);
+                self.take(products, &mut columns, around, true);
             }
         }
         FreeForm { place: self.place, log, terms, gain: now.gain() - state.gain() }
     }
+}
+
+/// The evidence of all lengths mixed, with the amplitude of the best, and which that is.
+fn closest(all: &[GroupEvidence]) -> (GroupEvidence, usize) {
+    let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
+    (GroupEvidence { log: log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>()), ..all[best] }, best)
 }
 
 fn mixed(all: &[GroupEvidence]) -> GroupEvidence {

@@ -137,7 +137,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         self.values.iter().find(|(other, _)| *other == of).and_then(|(_, values)| values.as_deref())
     }
 
-    pub fn block(&mut self, group: &FreeGroup) -> Option<ProjectedColumns> {
+    /// Columns of a group before geometry is projected off; none where some row does not tell its variables.
+    pub fn raw(&mut self, group: &FreeGroup) -> Option<Vec<f64>> {
         let mut functions: Vec<Vec<f64>> = vec![vec![1.0; self.frame.view.problem.rows.len()]];
         for factor in group.law.factors() {
             let own = self.at_rows(factor.of, &factor.basis)?;

@@ -1,16 +1,17 @@
 //! A look at a judged model: free forms of all places beside it, instead of it, and instead of each of its findings.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use super::free_form::{AroundGroups, FreeForm, side_by_side};
-use super::names::{ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, survey_places, unit_variances};
-use super::state::KnownCauses;
+use super::free_form::{AroundGroups, FreeForm, PlaceGroups, side_by_side};
+use super::names::{
+    ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places, unit_variances,
+};
+use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
 use crate::diagnose::words::{FindingGroups, FindingKey, groups};
 use crate::effect::{Effect, Place, Survey};
-use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -31,7 +32,7 @@ pub(super) struct Sighted<'v> {
     fitter: &'v Fitter<'v>,
     blocks: Vec<ProjectedColumns>,
     /// Columns of all causes, and which are each one's.
-    all: DMatrix<f64>,
+    all: CauseColumns,
     ranges: Vec<Range<usize>>,
 }
 
@@ -39,7 +40,7 @@ impl<'v> Sighted<'v> {
     pub fn of(view: &'v RoundView<'v>, judged: &'v JudgedCauses, fitter: &'v Fitter<'v>) -> Self {
         let frame = ProjectedRows::of(view, &judged.state, fitter);
         let blocks: Vec<ProjectedColumns> = judged.state.causes.iter().map(|cause| frame.block(&cause.form)).collect();
-        let all = side_by_side(&blocks, frame.residual_rows());
+        let all = CauseColumns::new(&frame, side_by_side(&blocks, frame.residual_rows()));
         let mut at = 0;
         let range = |block: &ProjectedColumns| {
             at += block.square.len();
@@ -56,8 +57,8 @@ impl<'v> Sighted<'v> {
         (0..self.blocks.len()).filter(|i| is_in(*i)).flat_map(of).map(|(k, variance)| (k, variance.sqrt())).collect()
     }
 
-    fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> KnownCauses {
-        KnownCauses::of(&self.frame, &self.all, self.picked(is_in), scale)
+    fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> KnownCauses<'_> {
+        KnownCauses::of(&self.all, self.picked(is_in), scale)
     }
 }
 
@@ -66,8 +67,9 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     sight: &'l Sighted<'v>,
     pool: &'l CachedHypotheses<'a>,
     around: AroundGroups<'l, 'v>,
+    groups: Vec<PlaceGroups>,
     scale: f64,
-    whole: KnownCauses,
+    whole: KnownCauses<'l>,
     beside: SurveyedPlaces,
     findings: FindingGroups,
 }
@@ -76,18 +78,19 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
         let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without };
+        let all = groups_of_places(&around);
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
-        let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
+        let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
         let louder = louder.max(sight.fitter.least_of_the_noise());
         if louder > LOUDER || louder < 1.0 / LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);
-            beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
+            beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         }
         let findings = groups(&sight.judged.state, &sight.judged.set, pool, survey);
-        Self { sight, pool, around, scale, whole, beside, findings }
+        Self { sight, pool, around, groups: all, scale, whole, beside, findings }
     }
 
     fn case(&self) -> NameCase<'_, 'l, 'v, 'a> {
@@ -110,7 +113,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             return None;
         }
         let none = self.sight.state(&|_| false, self.scale);
-        let best = survey_places(&[(none, None)], &self.around).remove(0).best.into_iter().next()?;
+        let best = survey_places(&[(none, None)], &self.groups, &self.around).remove(0).best.into_iter().next()?;
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let price: f64 = set.iter().map(|h| case.price(*h) - listed + SIZE).sum();
@@ -160,7 +163,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();
         let rest = |own: &NamedFinding| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));
         let rests: Vec<(KnownCauses, Option<Place>)> = named.iter().map(rest).collect();
-        let instead = survey_places(&rests, &self.around);
+        let instead = survey_places(&rests, &self.groups, &self.around);
         let case = self.case();
         let odds = named.iter().zip(&rests).zip(&instead);
         odds.map(|((own, (rest, _)), instead)| (own.key, case.odds(own, rest, instead, &self.beside))).collect()

@@ -57,17 +57,25 @@ pub(super) struct SurveyedPlaces {
     pub best: Vec<FreeForm>,
 }
 
-/// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
-pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &AroundGroups) -> Vec<SurveyedPlaces> {
-    let all = places(around.survey);
-    let firsts: Vec<Vec<f64>> = all
-        .par_iter()
-        .map(|place| {
-            let beside: Vec<&KnownCauses> = states.iter().map(|(state, _)| state).collect();
-            let groups = PlaceGroups::of(*place, &beside, around);
-            states.iter().map(|(state, _)| groups.first(state)).collect()
-        })
-        .collect();
+/// The groups of all places, without their columns.
+pub(super) fn groups_of_places(around: &AroundGroups) -> Vec<PlaceGroups> {
+    places(around.survey).par_iter().map(|place| PlaceGroups::of(*place, around, false)).collect()
+}
+
+/// Free forms of all places, whose groups are `all`, beside some states: of each state the evidence by place, and the best ones with their
+/// terms.
+pub(super) fn survey_places(
+    states: &[(KnownCauses, Option<Place>)],
+    all: &[PlaceGroups],
+    around: &AroundGroups,
+) -> Vec<SurveyedPlaces> {
+    let beside: Vec<&KnownCauses> = states.iter().map(|(state, _)| state).collect();
+    let first = |groups: &PlaceGroups| -> Vec<f64> {
+        let groups = groups.with_pairs(&beside, around, false);
+        beside.iter().map(|state| groups.first(state)).collect()
+    };
+    let firsts: Vec<Vec<f64>> = all.par_iter().map(first).collect();
+    let all: Vec<Place> = all.iter().map(|groups| groups.place).collect();
     let mut wanted: Vec<(usize, usize)> = Vec::new();
     for (s, (_, own)) in states.iter().enumerate() {
         let mut order: Vec<usize> = (0..all.len()).collect();
@@ -80,8 +88,8 @@ pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &Ar
     let forms: Vec<Vec<(usize, FreeForm)>> = by_place
         .par_iter()
         .map(|p| {
-            let own = wanted.iter().filter(|(other, _)| other == p);
-            own.map(|(_, s)| (*s, PlaceGroups::of(all[*p], &[&states[*s].0], around).greedy(&states[*s].0, around))).collect()
+            let (groups, own) = (PlaceGroups::of(all[*p], around, true), wanted.iter().filter(|(other, _)| other == p));
+            own.map(|(_, s)| (*s, groups.with_pairs(&[&states[*s].0], around, true).greedy(&states[*s].0, around))).collect()
         })
         .collect();
     let forms: Vec<(usize, FreeForm)> = forms.into_iter().flatten().collect();
@@ -126,7 +134,7 @@ impl NameCase<'_, '_, '_, '_> {
         let set = &self.judged.set;
         let own = {
             let columns = named.own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
-            let picked = self.around.causes.select_columns(&columns);
+            let picked = self.around.causes.columns.select_columns(&columns);
             let variances: Vec<f64> = named.own.iter().map(|(_, variance)| *variance).collect();
             self.evidence_of(rest, &picked, &variances)
         };

@@ -6,7 +6,7 @@ use super::step::ModelStep;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::diagnose::words::FindingKey;
+use crate::diagnose::words::{FindingKey, of_the_open_world};
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
 
@@ -34,6 +34,7 @@ pub(crate) fn settle(
     let mut refused: Vec<Place> = Vec::new();
     let mut asked_alone = false;
     for round in 0..=ROUNDS {
+        tell(of_the_open_world(&judged.state));
         let view = RoundView::of(&judged.state, fitter);
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {

@@ -13,30 +13,39 @@ pub(super) struct PivotedCholesky {
 }
 
 impl PivotedCholesky {
-    /// Of a q x q matrix, row by row; only its lower triangle is read.
-    pub fn of(mut gram: Vec<f64>, q: usize) -> Self {
+    /// Of a q x q matrix, row by row; only its lower triangle is read. A column is computed when it is chosen: until then only what is left
+    /// on its diagonal is kept.
+    pub fn of(gram: Vec<f64>, q: usize) -> Self {
         let mut order: Vec<usize> = (0..q).collect();
-        let mut column = vec![0.0; q];
+        let mut left: Vec<f64> = (0..q).map(|k| gram[k * (q + 1)]).collect();
+        // Columns of the factor, one after another.
+        let mut columns: Vec<f64> = Vec::with_capacity(q * q);
         let mut rank = 0;
-        while let Some(pivot) = (rank..q).max_by(|a, b| gram[a * (q + 1)].total_cmp(&gram[b * (q + 1)])) {
-            let size = gram[pivot * (q + 1)];
+        while let Some(pivot) = (rank..q).max_by(|a, b| left[*a].total_cmp(&left[*b])) {
+            let size = left[pivot];
             if size <= INVISIBLE {
                 break;
             }
-            exchange(&mut gram, q, rank, pivot);
+            left.swap(rank, pivot);
             order.swap(rank, pivot);
-            let root = size.sqrt();
-            gram[rank * (q + 1)] = root;
-            for i in rank + 1..q {
-                gram[i * q + rank] /= root;
-                column[i] = gram[i * q + rank];
-                let (own, row) = (column[i], &mut gram[i * q + rank + 1..=i * q + i]);
-                row.iter_mut().zip(&column[rank + 1..=i]).for_each(|(value, other)| *value -= own * other);
+            columns.chunks_mut(q).for_each(|column| column.swap(rank, pivot));
+            let (root, own) = (size.sqrt(), order[rank]);
+            columns.resize((rank + 1) * q, 0.0);
+            let (known, column) = columns.split_at_mut(rank * q);
+            let column = &mut column[rank..];
+            column[0] = root;
+            let below = &mut column[1..];
+            below.iter_mut().zip(&order[rank + 1..]).for_each(|(value, k)| *value = gram[own.max(*k) * q + own.min(*k)]);
+            subtract(below, known, rank, q);
+            for (value, left) in below.iter_mut().zip(&mut left[rank + 1..]) {
+                *value /= root;
+                *left -= *value * *value;
             }
             rank += 1;
         }
         order.truncate(rank);
-        let triangle = (0..rank).flat_map(|a| gram[a * q..=a * q + a].iter().copied()).collect();
+        let mut triangle = Vec::with_capacity(rank * (rank + 1) / 2);
+        (0..rank).for_each(|a| triangle.extend((0..=a).map(|k| columns[k * q + a])));
         Self { order, triangle }
     }
 
@@ -85,20 +94,23 @@ impl PivotedCholesky {
     }
 }
 
-/// Exchanges rows and columns `a <= b` of a symmetric matrix of which the lower triangle counts.
-fn exchange(gram: &mut [f64], q: usize, a: usize, b: usize) {
-    if a == b {
-        return;
-    }
-    for j in 0..a {
-        gram.swap(a * q + j, b * q + j);
-    }
-    gram.swap(a * (q + 1), b * (q + 1));
-    for i in a + 1..b {
-        gram.swap(i * q + a, b * q + i);
-    }
-    for i in b + 1..q {
-        gram.swap(i * q + a, i * q + b);
+/// Takes off the rows below the next one what the `known` columns, `rank` of `q` entries each, have of them: four at once, in their order.
+fn subtract(below: &mut [f64], known: &[f64], rank: usize, q: usize) {
+    let parts = |column: &'_ [f64]| (column[rank], rank + 1);
+    for four in known.chunks(4 * q) {
+        let mut each = four.chunks(q);
+        if let [Some(a), Some(b), Some(c), Some(d)] = [each.next(), each.next(), each.next(), each.next()] {
+            let [(p, from), (r, _), (s, _), (t, _)] = [a, b, c, d].map(parts);
+            let rows = a[from..].iter().zip(&b[from..]).zip(&c[from..]).zip(&d[from..]);
+            for (value, (((a, b), c), d)) in below.iter_mut().zip(rows) {
+                *value = *value - p * a - r * b - s * c - t * d;
+            }
+        } else {
+            for column in four.chunks(q) {
+                let (own, from) = parts(column);
+                below.iter_mut().zip(&column[from..]).for_each(|(value, other)| *value -= own * other);
+            }
+        }
     }
 }
 

@@ -10,7 +10,8 @@ use super::stretches::thinned;
 use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
-use faer::Mat;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
 
 /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
@@ -69,19 +70,18 @@ struct Regression<'a> {
     rows: &'a [usize],
     /// Numbers of a row.
     width: usize,
-    /// Columns one after another, and how many.
+    /// An orthonormal basis of what they can do, columns one after another, and then what they leave of the points. Of any other basis the
+    /// determinants would differ by the same factor under all noises.
     columns: Vec<f64>,
+    /// Columns of the basis.
     count: usize,
-    points: Vec<f64>,
-    /// Sum of the logarithms of the design's pivots under white noise.
-    white: f64,
 }
 
 impl<'a> Regression<'a> {
     /// On the base model and the `kept` causes.
     fn of((problem, width): (&'a WhitenedProblem, usize), settled: &FitState, fitter: &Fitter, kept: &[bool]) -> Self {
         let rows = problem.residual_rows();
-        let mut points = problem.of_readings().to_vec();
+        let mut left = problem.of_readings().to_vec();
         let base = problem.jacobian(fitter.free());
         let mut columns: Vec<f64> = (0..base.ncols()).flat_map(|j| base.col_as_slice(j).to_vec()).collect();
         for (cause, kept) in settled.causes.iter().zip(kept) {
@@ -91,35 +91,35 @@ impl<'a> Regression<'a> {
                 continue;
             }
             for (column, coefficient) in own.chunks(rows).zip(&cause.coefficients) {
-                points.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+                left.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        let count = columns.len() / rows;
-        let mut left = points.clone();
-        project(orthonormal(&matrix(&columns, rows)).as_ref(), &mut left);
-        let gross = left.clone();
+        let design = orthonormal(&Mat::from_fn(rows, columns.len() / rows, |i, j| columns[j * rows + i]));
+        project(design.as_ref(), &mut left);
         AutocorrelatedNoise::without_gross(&mut left);
-        points.iter_mut().zip(gross.iter().zip(&left)).for_each(|(value, (gross, left))| *value += left - gross);
-        let mut own = Self { rows: &problem.rows, width, columns, count, points, white: 0.0 };
-        own.white = logarithms(&pivots(&matrix(&own.columns, rows)));
-        own
+        let mut columns: Vec<f64> = (0..design.ncols()).flat_map(|j| design.col_as_slice(j).to_vec()).collect();
+        columns.extend(left);
+        Self { rows: &problem.rows, width, columns, count: design.ncols() }
     }
 
-    /// -2 ln of the restricted likelihood, its scale estimated, up to a constant of the points.
+    /// -2 ln of the restricted likelihood, its scale estimated, up to a constant of the points; infinite where they leave nothing.
     fn cost(&self, noise: Option<AutocorrelatedNoise>) -> f64 {
         let believed = noise.unwrap_or(AutocorrelatedNoise::NONE);
-        let rows = self.points.len();
+        let rows = self.columns.len() / (self.count + 1);
         let innovations = believed.filter(self.rows, self.width);
-        let (mut columns, mut left) = (self.columns.clone(), self.points.clone());
+        let mut columns = self.columns.clone();
         columns.chunks_mut(rows).for_each(|column| innovations.apply(column));
-        innovations.apply(&mut left);
-        columns.extend(left);
-        // The last pivot is the length of what the design leaves of the points.
-        let pivots = pivots(&matrix(&columns, rows));
+        let columns = MatRef::from_column_major_slice(&columns, rows, self.count + 1);
+        let mut gram = Mat::zeros(self.count + 1, self.count + 1);
+        let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        matmul(gram.as_mut(), lower, Accum::Replace, columns.transpose(), whole, columns, whole, 1.0, Par::Seq);
+        let Ok(factor) = gram.llt(Side::Lower) else { return f64::INFINITY };
+        let pivot = |k: usize| factor.L()[(k, k)];
         let freedom = (rows.saturating_sub(self.count)).max(1) as f64;
-        let square = pivots[self.count].powi(2);
+        // The last pivot is the length of what the design leaves of the points.
+        let square = pivot(self.count).powi(2);
         let shapes = if noise.is_some() { 2.0 * freedom.ln() } else { 0.0 };
-        let design = logarithms(&pivots[..self.count]) - self.white;
+        let design: f64 = (0..self.count).map(|k| pivot(k).ln()).sum();
         freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * design + shapes
     }
 
@@ -132,19 +132,4 @@ impl<'a> Regression<'a> {
         let length = |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
         (best, as_good.max_by(|a, b| length(a).total_cmp(&length(b))).flatten())
     }
-}
-
-fn matrix(columns: &[f64], rows: usize) -> Mat<f64> {
-    Mat::from_fn(rows, columns.len() / rows, |i, j| columns[j * rows + i])
-}
-
-/// Sizes of the pivots of a design's QR decomposition.
-fn pivots(design: &Mat<f64>) -> Vec<f64> {
-    let factor = design.qr();
-    let triangle = factor.thin_R();
-    (0..triangle.ncols()).map(|k| triangle[(k, k)].abs().max(f64::MIN_POSITIVE)).collect()
-}
-
-fn logarithms(values: &[f64]) -> f64 {
-    values.iter().map(|value| value.ln()).sum()
 }

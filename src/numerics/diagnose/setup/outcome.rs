@@ -3,7 +3,7 @@
 use super::compare::{AsStated, ExplainedSetup};
 use super::mixture::TwoSetups;
 use super::pairs::median;
-use super::words::{mm, words};
+use super::words::{SetupWords, mm, together, words};
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
 use crate::diagnose::unasked::{on_its_base, unasked};
 use crate::effect::{ParameterEstimate, Place};
@@ -18,7 +18,7 @@ const FAR: f64 = 4.0;
 /// A set-up error that explains what the nominal robot leaves.
 pub(super) fn explained(question: &Question, stated: &AsStated, found: &ExplainedSetup) -> Diagnosis {
     let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
-    let all: Vec<_> = found.wrong.iter().map(|wrong| own(*wrong)).collect();
+    let all = together(&found.wrong, question.robot, own);
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
     let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
     let scale: f64 = all.iter().map(|words| words.scale).product();
@@ -30,12 +30,13 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
         mm(after),
         mend.join("; ")
     );
-    let mut alike: Vec<String> =
-        found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
-    alike.dedup();
-    alike.retain(|other| !what.contains(&other.as_str()));
+    let mut alike: Vec<SetupWords> =
+        found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong)).collect();
+    alike.dedup_by(|a, b| a.what == b.what);
+    alike.retain(|other| !what.contains(&other.what.as_str()));
     if !alike.is_empty() {
-        text.push_str(&format!(". These data are explained equally well if {}", alike.join(", or ")));
+        let each: Vec<String> = alike.iter().map(|words| format!("{}; remedy then: {}", words.what, words.mend)).collect();
+        text.push_str(&format!(". These data are explained equally well if {}", each.join(", or if ")));
     }
     let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
     let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();

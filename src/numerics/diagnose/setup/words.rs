@@ -98,6 +98,21 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
     SetupWords::of(what, mend)
 }
 
+/// Of several set-up errors at once; joints that turn the other way have one list of signs.
+pub(super) fn together(wrong: &[WrongSetup], robot: &RobotModel, words: impl Fn(WrongSetup) -> SetupWords) -> Vec<SetupWords> {
+    let signs = |wrong: &WrongSetup| match wrong {
+        WrongSetup::Sign(joint) => vec![*joint],
+        WrongSetup::Signs(group) => group.joints().collect(),
+        _ => Vec::new(),
+    };
+    let turned: Vec<usize> = wrong.iter().flat_map(signs).collect();
+    let twice = |joint: &usize| turned.iter().filter(|other| *other == joint).count() > 1;
+    let reversed: Vec<usize> = (0..robot.joints()).filter(|joint| turned.contains(joint) && !twice(joint)).collect();
+    let others = wrong.iter().filter(|wrong| signs(wrong).is_empty()).map(|wrong| words(*wrong));
+    let (what, mend) = of_signs(&reversed, robot.joints());
+    others.chain((!reversed.is_empty()).then(|| SetupWords::of(what, mend))).collect()
+}
+
 /// Joints, from 0, that turn the other way.
 fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
     let signs: Vec<&str> = (0..joints).map(|joint| if reversed.contains(&joint) { "-1" } else { "1" }).collect();

@@ -48,6 +48,16 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
     }
 }
 
+/// What a round begins with in a line.
+pub(crate) fn of_the_search(now: &FitState) -> String {
+    format!("sets of causes are compared, from {} on", counted(now.causes.len(), "cause"))
+}
+
+/// What follows a judgement in a line, once for every change of the model.
+pub(crate) fn of_the_open_world(judged: &FitState) -> String {
+    format!("what is in no list is asked at every place, beside {} and in their place", counted(judged.causes.len(), "cause"))
+}
+
 /// Causes of a round that are named.
 const NAMED: usize = 4;
 

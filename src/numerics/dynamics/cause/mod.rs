@@ -20,6 +20,7 @@ mod spring;
 mod stribeck;
 mod torque_constant;
 mod unknown;
+mod unnamed_friction;
 mod viscous;
 mod warmup;
 mod wrist_coupling;
@@ -36,7 +37,7 @@ pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
 
 /// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 23] = [
     &viscous::Viscous,
     &coulomb::Coulomb,
     &offset::Offset,
@@ -59,6 +60,7 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
     &unknown::Unnamed,
+    &unnamed_friction::UnnamedFriction,
 ];
 
 /// A shape number that is refined.

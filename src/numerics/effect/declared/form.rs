@@ -57,6 +57,7 @@ impl DeclaredForm {
             QuantityKind::Current => survey.data.current.is_some(),
             QuantityKind::Velocity => survey.data.velocity.is_some(),
             QuantityKind::Temperature | QuantityKind::Lagging => survey.reference_c.is_some(),
+            QuantityKind::Circumstance(column) => survey.data.circumstances.contains_key(column.text()),
             _ => true,
         };
         let quantities = cause.pattern().laws.iter().flat_map(Formula::quantities);

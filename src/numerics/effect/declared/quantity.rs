@@ -3,6 +3,7 @@
 //! Without a number a name is of the joint at which the effect acts, `_next` and `_before` of its neighbours.
 
 use crate::effect::Variable;
+use crate::robot::{CircumstanceName, law_columns};
 
 /// A number of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +55,8 @@ pub enum QuantityKind {
     Azimuth,
     Elevation,
     Range,
+    /// A circumstance that the recording declares.
+    Circumstance(CircumstanceName),
 }
 
 use QuantityKind as K;
@@ -81,29 +84,33 @@ const NAMES: [(&str, QuantityKind, bool, bool); 19] = [
     ("range", K::Range, false, false),
 ];
 
+/// The same with every circumstance that the recording declares for laws.
+fn all() -> impl Iterator<Item = (&'static str, QuantityKind, bool, bool)> {
+    let declared = law_columns().filter_map(|column| {
+        let name = CircumstanceName::of(column.setting)?;
+        Some((column.setting, K::Circumstance(name), column.is_of_joints(), false))
+    });
+    NAMES.into_iter().chain(declared)
+}
+
 /// All names, for "allowed: ...".
 pub fn known() -> String {
-    let word = |(name, _, jointed, constant): &(&str, K, bool, bool)| match (jointed, constant) {
-        (true, true) => format!("{name}(constant)"),
-        (true, false) => (*name).to_string(),
-        (false, true) => format!("{name}(constant)"),
-        (false, false) => (*name).to_string(),
-    };
-    let of_joints = NAMES.iter().filter(|row| row.2).map(word).collect::<Vec<_>>().join(", ");
-    let of_rows = NAMES.iter().filter(|row| !row.2).map(word).collect::<Vec<_>>().join(", ");
+    let word = |(name, _, _, constant): (&str, K, bool, bool)| if constant { format!("{name}(constant)") } else { name.into() };
+    let of_joints = all().filter(|row| row.2).map(word).collect::<Vec<_>>().join(", ");
+    let of_rows = all().filter(|row| !row.2).map(word).collect::<Vec<_>>().join(", ");
     format!("{of_joints} of this joint, of joint 3 as q3, of a neighbour as q_next or q_before; {of_rows}")
 }
 
 /// All names without what may follow them.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    NAMES.iter().map(|row| row.0)
+    all().map(|row| row.0)
 }
 
 impl RowQuantity {
     /// The quantity of a name, and whether it takes a constant.
     pub fn named(text: &str) -> Option<(QuantityKind, Whose, bool)> {
-        if let Some((_, kind, jointed, constant)) = NAMES.iter().find(|row| row.0 == text) {
-            return Some((*kind, if *jointed { Whose::Own } else { Whose::Row }, *constant));
+        if let Some((_, kind, jointed, constant)) = all().find(|row| row.0 == text) {
+            return Some((kind, if jointed { Whose::Own } else { Whose::Row }, constant));
         }
         let split = text.find(|c: char| c.is_ascii_digit());
         let (name, of) = match (text.strip_suffix("_next"), text.strip_suffix("_before"), split) {
@@ -112,13 +119,13 @@ impl RowQuantity {
             (_, _, Some(at)) => (&text[..at], Whose::Joint(text[at..].parse::<usize>().ok()?.checked_sub(1)?)),
             _ => return None,
         };
-        let (_, kind, _, constant) = NAMES.iter().find(|row| row.0 == name && row.2)?;
-        Some((*kind, of, *constant))
+        let (_, kind, _, constant) = all().find(|row| row.0 == name && row.2)?;
+        Some((kind, of, constant))
     }
 
     /// As it is written, with these names of the shape numbers.
     pub fn text(&self, shape: &[String]) -> String {
-        let name = NAMES.iter().find(|row| row.1 == self.kind).map_or("", |row| row.0);
+        let name = all().find(|row| row.1 == self.kind).map_or("", |row| row.0);
         let of = match self.of {
             Whose::Own | Whose::Row => String::new(),
             Whose::Next => "_next".into(),
@@ -172,6 +179,7 @@ impl RowQuantity {
             K::Azimuth => Variable::Azimuth,
             K::Elevation => Variable::Elevation,
             K::Range => Variable::Range,
+            K::Circumstance(column) => Variable::Circumstance { column, joint: (self.of != Whose::Row).then_some(joint) },
         })
     }
 
@@ -181,6 +189,7 @@ impl RowQuantity {
             K::Current => Some("motor currents"),
             K::Velocity => Some("joint velocities"),
             K::Temperature | K::Lagging => Some("temperature"),
+            K::Circumstance(column) => Some(column.text()),
             _ => None,
         }
     }
@@ -198,6 +207,7 @@ impl Variable {
             Self::Payload => (K::Payload, None),
             Self::Temperature => (K::Temperature, None),
             Self::Time => (K::Time, None),
+            Self::Circumstance { column, joint } => (K::Circumstance(column), joint),
             _ => return None,
         };
         let whose = |of| if of == joint { Whose::Own } else { Whose::Joint(of) };
@@ -211,7 +221,8 @@ impl Variable {
                 of == joint
             }
             Self::Velocity { joint: of } => of == joint,
-            Self::Payload | Self::Temperature | Self::Time => true,
+            Self::Circumstance { joint: Some(of), .. } => of == joint,
+            Self::Payload | Self::Temperature | Self::Time | Self::Circumstance { joint: None, .. } => true,
             _ => false,
         }
     }

@@ -9,14 +9,14 @@ mod exchange;
 mod point_jacobian;
 mod site;
 mod spread;
-mod tell;
+mod t_optimal;
 mod visit_order;
 
 pub use brought::{BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought};
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
-pub use tell::{Alternative, Contest, Discrimination, Proposed, TOLD, tell};
+pub use t_optimal::{Alternative, Contest, Discrimination, MIN_SEPARATION_L, Proposed, tell};
 
 use super::model::Model;
 use crate::robot::{Measurements, Named};
@@ -215,14 +215,18 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
         time: data.time.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
         temperature: data.temperature.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
-        direction: data.direction.as_ref().map(|all| {
-            let of = |row: &usize| all[row * data.joints..(row + 1) * data.joints].iter().copied();
-            rows.iter().flat_map(of).collect()
-        }),
+        circumstances: data.circumstances.iter().map(|(name, all)| (*name, picked(all, data.rows(), rows))).collect(),
+        direction: data.direction.as_ref().map(|all| picked(all, data.rows(), rows)),
         target: data.target.as_ref().map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
         readings: data.readings.iter().map(|own| own.subset(rows)).collect(),
         ..Measurements::default()
     }
+}
+
+/// The numbers of these rows, of a quantity with as many for each of `count` rows.
+fn picked(all: &[f64], count: usize, rows: &[usize]) -> Vec<f64> {
+    let width = all.len() / count.max(1);
+    rows.iter().flat_map(|row| all[row * width..(row + 1) * width].iter().copied()).collect()
 }
 
 /// Sets of `count` different candidates, drawn evenly.

@@ -4,6 +4,7 @@
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
 pub use about::About;
+pub use urdf::UrdfOutline;
 
 use crate::description::{InertiaMoments, JointKind, RobotDescription};
 use crate::error::Result;
@@ -43,6 +44,11 @@ pub struct Imported {
 /// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.
 pub fn read_calib(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
     calib::read(file, urdf)
+}
+
+/// Where the chain of a URDF begins that ends at the link `tip`, and which of its joints slide. Fails with every fault of the file.
+pub fn urdf_outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
+    urdf::outline(file, tip)
 }
 
 /// Reads a practice `robot.json` (mm, kg, Nm/A; couplings as pairs from 0). Fails with every fault of the file.

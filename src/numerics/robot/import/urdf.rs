@@ -19,6 +19,15 @@ struct UrdfJoint<'a> {
     origin: Isometry3<f64>,
 }
 
+/// Where a chain begins, and what its joints are.
+#[derive(Debug)]
+pub struct UrdfOutline {
+    /// The first link.
+    pub base: String,
+    /// Whether a joint is prismatic, from the base on.
+    pub sliding: Vec<bool>,
+}
+
 struct Reader<'a> {
     label: &'a str,
     document: &'a Document<'a>,
@@ -34,6 +43,23 @@ pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameCh
         Some(chain) if reader.faults.is_empty() => Ok(chain),
         _ => Err(Error::Spec(reader.faults)),
     }
+}
+
+/// The first link of the chain that ends at `tip`, and which of its joints slide: the link `base_link` where it stands on the way, else the
+/// one that nothing carries. Fails as [`read`] does.
+pub(super) fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
+    let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let joints = document.root_element().children().filter(|node| node.has_tag_name("joint"));
+    let end = |joint: &Node, name: &str| {
+        joint.children().find(|node| node.has_tag_name(name)).and_then(|node| node.attribute("link")).map(String::from)
+    };
+    let parents: BTreeMap<String, String> = joints.filter_map(|joint| end(&joint, "child").zip(end(&joint, "parent"))).collect();
+    let way = std::iter::successors(Some(tip.to_string()), |link| parents.get(link).cloned());
+    // Joints that run in a circle are a fault of the chain.
+    let way: Vec<String> = way.take(parents.len() + 1).collect();
+    let base = way.iter().find(|link| *link == "base_link" && *link != tip).or(way.last()).cloned().unwrap_or_default();
+    let chain = read(file, &base, tip)?;
+    Ok(UrdfOutline { base, sliding: chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect() })
 }
 
 impl<'a> Reader<'a> {
@@ -59,7 +85,7 @@ impl<'a> Reader<'a> {
                 self.fault(node, format!("link `{name}` is there twice"));
             }
         }
-        for name in [base, tip] {
+        for name in [base].into_iter().chain((tip != base).then_some(tip)) {
             if !links.contains_key(name) {
                 let hint =
                     nearest(name, links.keys().copied()).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();

@@ -60,7 +60,7 @@ pub struct Proposed {
 }
 
 /// Explanations whose L is below this cannot be separated.
-pub const TOLD: f64 = 25.0;
+pub const MIN_SEPARATION_L: f64 = 25.0;
 
 /// Of a squared effect less than this is rounding and second order.
 const NOTHING: f64 = 1e-6;
@@ -123,7 +123,7 @@ pub fn tell(
     let alike = [0, 1].map(|truth| {
         let whole = |rows: &Mat<f64>| rows.col(rows.ncols() - 1).squared_norm_l2();
         let seen = gather(&views[truth].jacobian.rows(model, data), rows);
-        before[truth] < TOLD && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
+        before[truth] < MIN_SEPARATION_L && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
     });
     if alike == [true; 2] {
         return Ok(Discrimination { before, alike, proposed: None });

@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
-pub(super) struct Means {
+pub(super) struct ExecutionArguments {
     /// Overrides a variable, the seed, or a setting of a stage; may be given several times
     #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
     set: Vec<Override>,
@@ -40,10 +40,15 @@ pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
     }
 }
 
-impl Means {
+impl ExecutionArguments {
     /// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
     pub fn plan(&self, pipeline: &Path) -> Result<Plan> {
-        Plan::load(pipeline, &self.set, STAGES).map_err(|error| match error {
+        self.plan_with(pipeline, &[])
+    }
+
+    /// The same with more overrides, behind those of the command line.
+    pub fn plan_with(&self, pipeline: &Path, more: &[Override]) -> Result<Plan> {
+        Plan::load(pipeline, &[&self.set, more].concat(), STAGES).map_err(|error| match error {
             Error::Spec(mut faults) => {
                 let robots = faults_of_robots(pipeline, &self.set, STAGES);
                 let new: Vec<Fault> = robots.into_iter().filter(|fault| !faults.contains(fault)).collect();

@@ -1,7 +1,11 @@
-//! Every column of the recording, declared once: what kinds of measurement own, and the circumstances that are here.
+//! Circumstances of a measurement, declared once each: what `ingest` calls them, how the recording stores them, whether laws may read them.
+//!
+//! A line with `.in_laws()` is all that a new circumstance takes: it is read, stored, carried to the numerics, and known to declared effects.
 
-use crate::observation::{ColumnShape, DeclaredColumn, KINDS};
+use super::column::{ColumnShape, DeclaredColumn};
 use crate::units::Quantity::{Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time, Torque};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
 
@@ -9,7 +13,8 @@ const fn simulated(setting: &'static str, stored: &'static [&'static str], about
     DeclaredColumn::number(setting, stored, Length, [-200.0, 200.0], about).together(SIMULATED)
 }
 
-static CIRCUMSTANCES: &[DeclaredColumn] = &[
+/// Every circumstance, in the order in which people see them.
+pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
     DeclaredColumn::text("point_id", "Name of the point; without it rows are called `row 17`."),
     DeclaredColumn {
         shape: ColumnShape::Count,
@@ -27,6 +32,8 @@ static CIRCUMSTANCES: &[DeclaredColumn] = &[
     DeclaredColumn::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
     DeclaredColumn::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
     DeclaredColumn::number("temperature", &["temp"], Temperature, [-60.0, 200.0], "Temperature of the arm or of the room."),
+    DeclaredColumn::number("humidity", &["humidity"], Number, [0.0, 100.0], "Relative humidity of the air, percent; no unit.")
+        .in_laws(),
     simulated(
         "sim_x",
         &["sim_x"],
@@ -74,7 +81,29 @@ static CIRCUMSTANCES: &[DeclaredColumn] = &[
     },
 ];
 
-/// All columns, in the order in which people see them.
-pub fn columns() -> impl Iterator<Item = &'static DeclaredColumn> {
-    CIRCUMSTANCES.iter().chain(KINDS.iter().flat_map(|kind| kind.about().columns))
+/// The setting of a circumstance that laws may read; read from text, it is one that is declared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CircumstanceName(&'static str);
+
+impl CircumstanceName {
+    /// Of a declared circumstance; `None` where laws know no such one.
+    pub fn of(setting: &str) -> Option<Self> {
+        law_columns().find(|column| column.setting == setting).map(|column| Self(column.setting))
+    }
+    /// As the setting is written.
+    pub fn text(self) -> &'static str {
+        self.0
+    }
+}
+
+impl<'de> Deserialize<'de> for CircumstanceName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Self::of(&name).ok_or_else(|| D::Error::custom(format!("no circumstance `{name}` that laws may read")))
+    }
+}
+
+/// Circumstances that declared laws may read by name.
+pub fn law_columns() -> impl Iterator<Item = &'static DeclaredColumn> {
+    CIRCUMSTANCES.iter().filter(|column| column.in_laws)
 }

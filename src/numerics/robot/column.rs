@@ -21,6 +21,8 @@ pub struct DeclaredColumn {
     pub together: &'static [&'static str],
     /// Whether it is the measured value, its uncertainty, or a name.
     pub part: Part,
+    /// Whether declared laws may read it by its name.
+    pub in_laws: bool,
 }
 
 /// How a file writes a quantity.
@@ -100,7 +102,17 @@ impl DeclaredColumn {
         range: [f64; 2],
         about: &'static str,
     ) -> Self {
-        Self { setting, about, shape: ColumnShape::Number, quantity, range, stored, together: &[], part: Part::Circumstance }
+        Self {
+            setting,
+            about,
+            shape: ColumnShape::Number,
+            quantity,
+            range,
+            stored,
+            together: &[],
+            part: Part::Circumstance,
+            in_laws: false,
+        }
     }
 
     /// A text, stored by the name of its setting.
@@ -124,6 +136,16 @@ impl DeclaredColumn {
     /// The same, which must be mapped together with these settings.
     pub const fn together(self, together: &'static [&'static str]) -> Self {
         Self { together, ..self }
+    }
+
+    /// The same, which declared laws may read by its name.
+    pub const fn in_laws(self) -> Self {
+        Self { in_laws: true, ..self }
+    }
+
+    /// Whether it has a number for each joint.
+    pub fn is_of_joints(&self) -> bool {
+        matches!(self.shape, ColumnShape::Joints { .. })
     }
 
     /// Whether its cells are names.

@@ -1,0 +1,104 @@
+//! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
+
+use super::{CarriedTorques, Export, Format};
+use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS};
+use crate::error::{Error, Result};
+use crate::identified::IdentifiedTorques;
+use crate::table::TorqueParameterRow;
+use serde_json::{Map, Value, json};
+
+pub(super) struct Dynamics;
+
+impl Format for Dynamics {
+    fn name(&self) -> &'static str {
+        "dynamics"
+    }
+
+    fn help(&self) -> &'static str {
+        "Friction, inertials and all other causes of the torques with sigma, as plain JSON"
+    }
+
+    fn carries(&self) -> CarriedTorques {
+        CarriedTorques::All
+    }
+
+    fn text(&self, export: &Export) -> Result<String> {
+        let Some(torques) = &export.identified.torques else {
+            let message = "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
+            return Err(Error::spec("--format dynamics", message));
+        };
+        let document = document(export, torques);
+        serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    }
+}
+
+/// The model of torques as one document.
+pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
+    let model = &torques.model;
+    let rows = |effect: &'static str| torques.parameters.0.iter().filter(move |row| row.effect == effect);
+    let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
+    let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
+        let place = format!("joint {}", index + 1);
+        let of = |effect: &'static str| rows(effect).find(|row| row.place == place).map_or(Value::Null, number);
+        let seen = &model.range[index];
+        json!({
+            "name": joint.name, "viscous": of("viscous_friction"), "coulomb": of("coulomb_friction"),
+            "armature": of("rotor_inertia"), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
+            "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
+        })
+    });
+    let consistent = model.consistency();
+    let links = (0..model.joints()).map(|link| {
+        let place = format!("link {}", link + 1);
+        let numbers: Map<String, Value> =
+            rows("rigid_body").filter(|row| row.place == place).map(|row| (row.quantity.clone(), number(row))).collect();
+        let body = model.body(link).map(|body| {
+            let i = &body.inertia;
+            json!({
+                "mass_kg": body.mass, "centre_from_joint_m": <[f64; 3]>::from(body.centre),
+                "inertia_about_centre_kg_m2": [i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]],
+            })
+        });
+        let known = consistent.iter().find(|one| one.link == link);
+        json!({
+            "link": link + 1, "whole": model.is_whole(link), "consistent": known.map(|one| one.is_consistent()),
+            "body": body, "numbers": numbers,
+        })
+    });
+    json!({
+        "calib_torques": 1,
+        "name": export.corrected.name,
+        "origin": torques.origin,
+        "conventions": format!(
+            "SI; joints and links from 1, axes of the base at the zero pose; numbers of a link are {}, moments from its joint's point and \
+             inertias about it, those of links that are not whole stand for others too; the last link carries the payload; torques are those \
+             that the drives or sensors of the recording state",
+            INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
+        ),
+        "sign_width_rad_s": model.sign_width,
+        "joints": joints.collect::<Vec<_>>(),
+        "links": links.collect::<Vec<_>>(),
+        "causes": causes(torques),
+        "of_the_recording": torques.of_the_recording,
+        "remarks": torques.warnings,
+    })
+}
+
+/// Every cause with all of its numbers.
+fn causes(torques: &IdentifiedTorques) -> Vec<Value> {
+    let model = &torques.model;
+    let cause = |(place, term): (usize, &crate::dynamics::TorqueTerm)| {
+        let prefix = format!("{}.", model.prefix(place));
+        let own = torques.parameters.0.iter().filter(|row| {
+            let quantity = row.name.strip_prefix(&prefix);
+            quantity.is_some_and(|quantity| quantity == row.quantity)
+        });
+        let numbers: Map<String, Value> =
+            own.map(|row| (row.quantity.clone(), json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma }))).collect();
+        json!({
+            "effect": term.effect, "where": term.place.to_string(), "numbers": numbers, "with": term.with, "shape": term.shape,
+            "rms_nm": term.rms,
+        })
+    };
+    model.terms.iter().enumerate().map(cause).collect()
+}

@@ -1,0 +1,106 @@
+//! Torques that a planned motion needs, by the identified model: differentiated and composed as the recording was.
+
+use super::arm::DynamicArm;
+use super::clock::RecordingClock;
+use super::model::TorqueModel;
+use super::recording::TorqueRecording;
+use super::scene::{DynamicScene, column};
+use crate::error::{Error, Result};
+
+/// s: longer ago than any gear warms up.
+const LONG_AGO: f64 = 1e6;
+
+/// A motion of n joints at an even clock; lists are row-major (rows x n).
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedMotion {
+    /// Number of joints n.
+    pub joints: usize,
+    /// s, ascending in even steps; length rows.
+    pub time: Vec<f64>,
+    /// rad.
+    pub position: Vec<f64>,
+    /// rad/s. `None`: found from positions.
+    pub velocity: Option<Vec<f64>>,
+    /// rad/s^2. `None`: found from positions.
+    pub acceleration: Option<Vec<f64>>,
+    /// s from when the arm began to move to the first row, for friction that falls as gears warm up. `None`: the arm is warm.
+    pub since_start: Option<f64>,
+}
+
+/// What a motion needs; row-major (rows x n).
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeededTorques {
+    /// Nm at the joints, as the drives or sensors of the recording state it.
+    pub torque: Vec<f64>,
+    /// rad/s.
+    pub velocity: Vec<f64>,
+    /// rad/s^2.
+    pub acceleration: Vec<f64>,
+}
+
+impl TorqueModel {
+    /// Torques of a motion of the arm that the model was identified on. Fails where sizes differ, there are fewer than ten rows, or no
+    /// cause has a term's name.
+    pub fn needed(&self, arm: &DynamicArm, motion: &PlannedMotion) -> Result<NeededTorques> {
+        /// Rows that derivatives need.
+        const LEAST: usize = 10;
+        let (n, rows) = (self.joints(), motion.time.len());
+        if arm.joints() != n || motion.joints != n || motion.position.len() != n * rows {
+            let message = format!("the model has {n} joints, the arm {}, the motion {}", arm.joints(), motion.joints);
+            return Err(Error::data("motion", message));
+        }
+        if rows < LEAST {
+            return Err(Error::data("motion", format!("has {rows} rows; at least {LEAST} are needed")));
+        }
+        let mut scene = self.scene(arm, motion);
+        scene.believe(&self.inertials);
+        let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
+        let mut course = vec![0.0; rows];
+        for term in &self.terms {
+            let form = term.form()?;
+            for joint in form.cause.acts_on(&form, n) {
+                for (number, coefficient) in term.coefficients.iter().enumerate() {
+                    form.cause.write(&form, &scene, joint, number, &mut course);
+                    torque[joint].iter_mut().zip(&course).for_each(|(sum, part)| *sum += coefficient * part);
+                }
+            }
+        }
+        let by_row = |courses: &[Vec<f64>]| (0..rows).flat_map(|row| courses.iter().map(move |course| course[row])).collect();
+        Ok(NeededTorques {
+            torque: by_row(&torque),
+            velocity: by_row(&scene.velocity),
+            acceleration: by_row(&scene.acceleration),
+        })
+    }
+
+    /// The motion as causes see it.
+    fn scene<'a>(&self, arm: &'a DynamicArm, motion: &PlannedMotion) -> DynamicScene<'a> {
+        let (n, rows) = (motion.joints, motion.time.len());
+        let recording = TorqueRecording {
+            joints: n,
+            time: motion.time.clone(),
+            position: motion.position.clone(),
+            velocity: None,
+            torque: Vec::new(),
+            temperature: None,
+            trajectory: vec![1; rows],
+            held_out: vec![false; rows],
+            from_current: false,
+        };
+        let rate = (rows - 1) as f64 / (motion.time[rows - 1] - motion.time[0]);
+        let clock = RecordingClock { rate, stretches: std::iter::once(0..rows).collect() };
+        let mut scene = DynamicScene::new(arm, &recording, &clock, self.cutoff, false);
+        scene.sign_width = self.sign_width;
+        let begun = motion.since_start.unwrap_or(LONG_AGO);
+        scene.time.iter_mut().for_each(|time| *time += begun);
+        let columns = |all: &Vec<f64>| (0..n).map(|joint| column(all, n, joint)).collect::<Vec<Vec<f64>>>();
+        if let Some(velocity) = &motion.velocity {
+            scene.position = columns(&motion.position);
+            scene.velocity = columns(velocity);
+        }
+        if let Some(acceleration) = &motion.acceleration {
+            scene.acceleration = columns(acceleration);
+        }
+        scene
+    }
+}

@@ -1,0 +1,98 @@
+//! A judged set as one model, with its covariance.
+
+use super::choice::CauseChoice;
+use super::model::{JointRange, TorqueModel, TorqueTerm};
+use super::newton_euler::INERTIAL_NUMBERS;
+use super::problem::TorqueProblem;
+use super::sweep::SweptColumns;
+
+impl TorqueModel {
+    /// Of a judged set.
+    pub(super) fn of(choice: &CauseChoice, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Self {
+        let problem = choice.problem;
+        let adds = |number: &usize| {
+            let form = choice.form(*number);
+            problem.scene.declared.as_ref().is_none_or(|declared| form.cause.inertial(form, declared).is_none())
+        };
+        let adding: Vec<usize> = set.iter().copied().filter(adds).collect();
+        let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
+        let term = |number: &usize| {
+            let form = choice.form(*number);
+            TorqueTerm {
+                effect: form.cause.name().into(),
+                place: form.place,
+                with: form.with,
+                shape: form.shape.clone(),
+                coefficients: problem.all.of(*number).map(value).collect(),
+                rms: rms(problem, problem.all.of(*number).map(|column| (column, value(column))).collect()),
+            }
+        };
+        let (identified, covariance) = covariance(problem, set, &adding, sweep);
+        let mut inertials = problem.inertials(set, solution);
+        inertials.iter_mut().zip(&identified).filter(|(_, known)| !**known).for_each(|(number, _)| *number = 0.0);
+        Self {
+            inertials,
+            identified,
+            terms: adding.iter().map(term).collect(),
+            covariance,
+            sign_width: problem.scene.sign_width,
+            latency: problem.latency,
+            cutoff: problem.reduction.cutoff,
+            range: (0..problem.joints()).map(|joint| range(problem, joint)).collect(),
+        }
+    }
+}
+
+/// Rms of the torque of coefficients over the joints that have some, Nm.
+fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
+    let torque = problem.predicted(&own);
+    let acting: Vec<&Vec<f64>> = torque.iter().filter(|course| course.iter().any(|value| *value != 0.0)).collect();
+    let count = (acting.len() * problem.reduction.rows.len()).max(1) as f64;
+    (acting.into_iter().flatten().map(|value| value * value).sum::<f64>() / count).sqrt()
+}
+
+fn range(problem: &TorqueProblem, joint: usize) -> JointRange {
+    let rows = || (0..problem.reduction.rows.len()).filter(|row| !problem.in_event(*row)).map(|row| problem.reduction.rows[row]);
+    let most = |course: &[f64]| rows().map(|row| course[row].abs()).fold(0.0, f64::max);
+    let position = &problem.scene.position[joint];
+    let ends = rows()
+        .map(|row| position[row])
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, greatest], value| [least.min(value), greatest.max(value)]);
+    JointRange {
+        position: ends,
+        speed: most(&problem.scene.velocity[joint]),
+        acceleration: most(&problem.scene.acceleration[joint]),
+    }
+}
+
+/// Which inertial numbers are identified, and the covariance of these and of the coefficients of `adding`.
+fn covariance(problem: &TorqueProblem, set: &[usize], adding: &[usize], sweep: &SweptColumns) -> (Vec<bool>, Vec<f64>) {
+    let mut columns: Vec<usize> = Vec::new();
+    // Each number of the model as a sum of coefficients: position in `columns`, and share.
+    let mut sums: Vec<Vec<(usize, f64)>> = Vec::new();
+    let mut identified = Vec::with_capacity(INERTIAL_NUMBERS * problem.joints());
+    for link in 0..problem.joints() {
+        let changes = problem.inertial_changes(set, link);
+        let first = columns.len();
+        columns.extend(changes.iter().map(|(column, _)| *column));
+        for number in 0..INERTIAL_NUMBERS {
+            let own = changes.iter().enumerate().map(|(place, (_, ten))| (first + place, ten[number]));
+            let own: Vec<(usize, f64)> = own.filter(|(_, share)| *share != 0.0).collect();
+            let known = problem.scene.declared.is_some() || !own.is_empty();
+            identified.push(known);
+            if known {
+                sums.push(own);
+            }
+        }
+    }
+    for column in adding.iter().flat_map(|number| problem.all.of(*number)) {
+        sums.push(vec![(columns.len(), 1.0)]);
+        columns.push(column);
+    }
+    let (all, width) = (sweep.covariance(&columns), columns.len());
+    let entry = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
+        a.iter().map(|(row, left)| left * b.iter().map(|(column, right)| right * all[row * width + column]).sum::<f64>()).sum()
+    };
+    let covariance = sums.iter().flat_map(|a| sums.iter().map(move |b| entry(a, b))).collect();
+    (identified, covariance)
+}

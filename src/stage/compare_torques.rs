@@ -1,0 +1,105 @@
+//! `compare_torques`: what changed between two recordings of one arm's torques: what is on the tool, friction, drives.
+
+use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueModel, changes};
+use crate::error::{Error, Result, counted};
+use crate::stage::dynamic_arm::dynamic_arm;
+use crate::stage::torque_signal::torque_recording;
+use crate::stage::{Context, Stage, reads, writes};
+use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Has no settings: `reads` names the earlier recording and its model.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CompareTorques {}
+
+reads! {
+    /// Input ports of [`CompareTorques`].
+    pub struct CompareTorquesReads {
+        robot: Robot,
+        motion: ArmMotion,
+        parameters: TorqueParameters,
+        contacts: Contacts,
+        earlier_motion: ArmMotion,
+        earlier_parameters: TorqueParameters,
+        earlier_contacts: Contacts,
+    }
+}
+writes! {
+    /// Output ports of `compare_torques`.
+    pub struct CompareTorquesWrites {
+        changes: TorqueChangeTable,
+    }
+}
+
+impl Stage for CompareTorques {
+    const NAME: &'static str = "compare_torques";
+    const SUMMARY: &'static str = "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = CompareTorquesReads;
+    type Writes = CompareTorquesWrites;
+
+    fn run(&self, reads: CompareTorquesReads, context: &Context) -> Result<CompareTorquesWrites> {
+        if reads.motion.time == reads.earlier_motion.time && reads.motion.q == reads.earlier_motion.q {
+            let message = "both recordings are the same: name the earlier one's stages, e.g. `reads: {earlier_motion: before, \
+                           earlier_parameters: first, earlier_contacts: first}`";
+            return Err(Error::spec("reads", message));
+        }
+        let robot = reads.robot.to_description()?;
+        let (mut arm, _) = dynamic_arm(&robot)?;
+        let (first, second) = (reads.earlier_parameters.to_model()?, reads.parameters.to_model()?);
+        let whole = |model: &TorqueModel| (0..model.joints()).all(|link| model.is_whole(link));
+        if !whole(&first) {
+            arm.links = None;
+        }
+        let (earlier, _) = torque_recording(reads.earlier_motion, &robot, Vec::new())?;
+        let (later, _) = torque_recording(reads.motion, &robot, Vec::new())?;
+        let (first_events, second_events) = (reads.earlier_contacts.events(), reads.contacts.events());
+        let diagnosed = |recording, model, events| DiagnosedRecording { recording, model, events };
+        let found = changes(&arm, &diagnosed(&earlier, &first, &first_events), &diagnosed(&later, &second, &second_events))?;
+        let strongest = found.changes.iter().filter(|change| change.rank.is_some());
+        let told: Vec<&TorqueChange> = strongest.collect();
+        told.iter().for_each(|change| context.services.note(sentence(change)));
+        if told.is_empty() {
+            context.services.note("nothing changed beyond noise".into());
+        }
+        for (joint, [before, after]) in (1..).zip(&found.rms) {
+            let joint: usize = joint;
+            context.services.note(format!(
+                "joint {joint}: {before:.3} Nm rms are left where nothing changed, {after:.3} Nm with the changes"
+            ));
+        }
+        let unchanged = found.changes.iter().filter(|change| change.rank.is_none()).count();
+        context.services.note(format!("{} held to be unchanged", counted(unchanged, "number")));
+        let previous = |name: &str| reads.earlier_parameters.0.iter().find(|row| row.name == name).map(|row| row.value);
+        Ok(CompareTorquesWrites { changes: TorqueChangeTable::of(&found, previous) })
+    }
+}
+
+fn sentence(change: &TorqueChange) -> String {
+    format!(
+        "{}. {}: {:+.4} +- {:.4} {}, probability {:.2}",
+        change.rank.unwrap_or_default(),
+        change.name,
+        change.change,
+        change.sigma,
+        change.unit,
+        change.probability
+    )
+}
+
+impl Contacts {
+    /// Pushes as events.
+    fn events(&self) -> Vec<ContactEvent> {
+        let event = |row: &crate::table::ContactRow| ContactEvent {
+            start: row.start_s,
+            end: row.end_s,
+            joints: Vec::new(),
+            force: [row.force_x_n, row.force_y_n, row.force_z_n],
+            sigma: [row.sigma_x_n, row.sigma_y_n, row.sigma_z_n],
+            gain: 0.0,
+        };
+        self.0.iter().map(event).collect()
+    }
+}

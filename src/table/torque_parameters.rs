@@ -1,0 +1,218 @@
+//! The identified model of torques: one table from which it is made again, and its covariance.
+
+use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm};
+use crate::effect::Place;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+crate::table::rows! { "torque_parameters",
+    /// Numbers of the model, one a row; key `name`.
+    pub struct TorqueParameters of TorqueParameterRow {
+        name: String,
+        /// `rigid_body`, the name of a cause, or `recording`.
+        effect: String,
+        place: String,
+        quantity: String,
+        value: f64,
+        unit: String,
+        /// One standard deviation.
+        sigma: Option<f64>,
+        /// Of the whole cause.
+        rms_nm: Option<f64>,
+        /// JSON.
+        form: Option<String>,
+    }
+}
+
+crate::table::rows! { "torque_covariance",
+    /// Pairs of estimated numbers, each once; key (`parameter`, `other`), with `parameter` not after `other` in the alphabet.
+    pub struct TorqueCovariance of TorqueCovarianceRow {
+        parameter: String,
+        other: String,
+        covariance: f64,
+        correlation: f64,
+    }
+}
+
+/// What a cause has besides its coefficients.
+#[derive(Serialize, Deserialize)]
+struct TermForm {
+    with: [usize; 2],
+    shape: Vec<f64>,
+}
+
+const LINKS: &str = "rigid_body";
+const SEEN: &str = "recording";
+/// Of a joint's range, in the order of [`ends`].
+const RANGE: [(&str, &str); 4] =
+    [("position_least", "rad"), ("position_greatest", "rad"), ("speed_greatest", "rad/s"), ("acceleration_greatest", "rad/s2")];
+/// Of the recording as a whole: width of a sign, latency, cut-off.
+const WHOLE: [(&str, &str); 3] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz")];
+
+fn ends(range: &JointRange) -> [f64; 4] {
+    [range.position[0], range.position[1], range.speed, range.acceleration]
+}
+
+fn fault(message: String) -> Error {
+    Error::data("table torque_parameters", message)
+}
+
+impl TorqueParameters {
+    /// Of a model. Fails where a term has no cause.
+    pub fn of(model: &TorqueModel) -> Result<Self> {
+        let names = model.names()?;
+        let width = names.len();
+        let mut numbers = names.iter().enumerate().map(|(number, (name, unit))| {
+            let sigma = model.covariance.get(number * (width + 1)).map(|variance| variance.max(0.0).sqrt());
+            (name.clone(), (*unit).to_string(), sigma)
+        });
+        let mut rows = Vec::with_capacity(width);
+        let known = (0..model.inertials.len()).filter(|number| model.identified[*number]);
+        for (number, (name, unit, sigma)) in known.zip(numbers.by_ref()) {
+            let link = number / INERTIAL_NUMBERS;
+            rows.push(TorqueParameterRow {
+                name,
+                effect: LINKS.into(),
+                place: Place::Links(link, link).to_string(),
+                quantity: INERTIAL_NAMES[number % INERTIAL_NUMBERS].into(),
+                value: model.inertials[number],
+                unit,
+                sigma,
+                rms_nm: None,
+                form: None,
+            });
+        }
+        for term in &model.terms {
+            let form = serde_json::to_string(&TermForm { with: term.with, shape: term.shape.clone() });
+            let form = form.map_err(|error| Error::Bug(error.to_string()))?;
+            for (value, (name, unit, sigma)) in term.coefficients.iter().zip(numbers.by_ref()) {
+                let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
+                let (effect, place) = (term.effect.clone(), term.place.to_string());
+                let (rms_nm, form) = (Some(term.rms), Some(form.clone()));
+                rows.push(TorqueParameterRow { name, effect, place, quantity, value: *value, unit, sigma, rms_nm, form });
+            }
+        }
+        rows.extend(seen(model));
+        rows.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(Self(rows))
+    }
+
+    /// The model, without its covariance. Fails where rows that every model has are missing or not understood.
+    pub fn to_model(&self) -> Result<TorqueModel> {
+        let joints = (1..).take_while(|joint| self.value(&format!("{SEEN}.j{joint}.{}", RANGE[0].0)).is_ok()).count();
+        if joints == 0 {
+            return Err(fault("has no row recording.j1.position_least: it is no model of torques".into()));
+        }
+        let mut model = TorqueModel {
+            inertials: vec![0.0; INERTIAL_NUMBERS * joints],
+            identified: vec![false; INERTIAL_NUMBERS * joints],
+            terms: Vec::new(),
+            covariance: Vec::new(),
+            sign_width: self.value(&format!("{SEEN}.{}", WHOLE[0].0))?,
+            latency: self.value(&format!("{SEEN}.{}", WHOLE[1].0))?,
+            cutoff: self.value(&format!("{SEEN}.{}", WHOLE[2].0))?,
+            range: (1..=joints).map(|joint| self.range(joint)).collect::<Result<_>>()?,
+        };
+        for row in self.0.iter().filter(|row| row.effect == LINKS) {
+            let link = match row.place.parse() {
+                Ok(Place::Links(link, _)) if link < joints => link,
+                _ => return Err(fault(format!("{}: `{}` is no link of {joints}", row.name, row.place))),
+            };
+            let number = INERTIAL_NAMES.iter().position(|name| *name == row.quantity);
+            let number = number.ok_or_else(|| fault(format!("{}: `{}` is no inertial number", row.name, row.quantity)))?;
+            model.inertials[INERTIAL_NUMBERS * link + number] = row.value;
+            model.identified[INERTIAL_NUMBERS * link + number] = true;
+        }
+        let mut terms: BTreeMap<&str, Vec<&TorqueParameterRow>> = BTreeMap::new();
+        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN) {
+            let prefix = row.name.strip_suffix(row.quantity.as_str()).unwrap_or(&row.name);
+            terms.entry(prefix).or_default().push(row);
+        }
+        model.terms = terms.values().map(|rows| term(rows)).collect::<Result<_>>()?;
+        Ok(model)
+    }
+
+    fn value(&self, name: &str) -> Result<f64> {
+        let row = self.0.iter().find(|row| row.name == name);
+        row.map(|row| row.value).ok_or_else(|| fault(format!("has no row {name}")))
+    }
+
+    fn range(&self, joint: usize) -> Result<JointRange> {
+        let [least, greatest, speed, acceleration] =
+            RANGE.map(|(quantity, _)| self.value(&format!("{SEEN}.j{joint}.{quantity}")));
+        Ok(JointRange { position: [least?, greatest?], speed: speed?, acceleration: acceleration? })
+    }
+}
+
+/// How and in which motion a model was seen.
+fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
+    let row = |name: String, place: Place, (quantity, unit): (&str, &str), value: f64| TorqueParameterRow {
+        name,
+        effect: SEEN.into(),
+        place: place.to_string(),
+        quantity: quantity.into(),
+        value,
+        unit: unit.into(),
+        sigma: None,
+        rms_nm: None,
+        form: None,
+    };
+    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff]);
+    let whole = whole.map(|(named, value)| row(format!("{SEEN}.{}", named.0), Place::Recording, *named, value));
+    let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
+        let of = move |(named, value): (&(&'static str, &'static str), f64)| {
+            row(format!("{SEEN}.j{}.{}", joint + 1, named.0), Place::Joint(joint), *named, value)
+        };
+        RANGE.iter().zip(ends(range)).map(of).collect::<Vec<_>>()
+    });
+    whole.chain(ranges).collect()
+}
+
+/// A cause from its rows.
+fn term(rows: &[&TorqueParameterRow]) -> Result<TorqueTerm> {
+    let first = rows[0];
+    let place = first.place.parse().map_err(|()| fault(format!("{}: `{}` is no place", first.name, first.place)))?;
+    let form = first.form.as_deref().unwrap_or_default();
+    let form: TermForm = serde_json::from_str(form).map_err(|error| fault(format!("{}: form `{form}`: {error}", first.name)))?;
+    let mut term = TorqueTerm {
+        effect: first.effect.clone(),
+        place,
+        with: form.with,
+        shape: form.shape,
+        coefficients: vec![0.0; rows.len()],
+        rms: first.rms_nm.unwrap_or(0.0),
+    };
+    let names = term.names()?;
+    for (value, (quantity, _)) in term.coefficients.iter_mut().zip(&names) {
+        let row = rows.iter().find(|row| row.quantity == *quantity);
+        *value = row.ok_or_else(|| fault(format!("{}: has no {quantity}", first.name)))?.value;
+    }
+    Ok(term)
+}
+
+impl TorqueCovariance {
+    /// Of a model. Fails where a term has no cause.
+    pub fn of(model: &TorqueModel) -> Result<Self> {
+        let names = model.names()?;
+        let width = names.len();
+        let mut rows = Vec::with_capacity(width * (width + 1) / 2);
+        for a in 0..width {
+            for b in a..width {
+                let covariance = model.covariance[a * width + b];
+                let scale = (model.covariance[a * (width + 1)] * model.covariance[b * (width + 1)]).max(0.0).sqrt();
+                let correlation = if a == b {
+                    1.0
+                } else if scale > 0.0 {
+                    covariance / scale
+                } else {
+                    0.0
+                };
+                let [first, second] = if names[a].0 <= names[b].0 { [a, b] } else { [b, a] }.map(|place| names[place].0.clone());
+                rows.push(TorqueCovarianceRow { parameter: first, other: second, covariance, correlation });
+            }
+        }
+        rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
+        Ok(Self(rows))
+    }
+}

@@ -1,0 +1,250 @@
+//! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
+
+use super::fields::fields;
+use super::text::delimiter;
+use super::{MOST, decimal};
+use crate::description::RobotDescription;
+use crate::dynamics::{NeededTorques, PlannedMotion};
+use crate::error::{Error, Fault, Result};
+
+/// Of the usual step of the clock: what a step may be off.
+const UNEVEN: f64 = 0.02;
+/// Decimals of torques (Nm) and currents (A).
+const DECIMALS: usize = 6;
+
+/// What a column holds; joints from 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum MotionColumn {
+    Time(f64),
+    Position(usize, f64),
+    Velocity(usize, f64),
+    Acceleration(usize, f64),
+}
+
+/// A file's motion, and its lines.
+pub struct Trajectory<'a> {
+    /// SI.
+    pub motion: PlannedMotion,
+    header: &'a str,
+    /// With their numbers, from 1.
+    lines: Vec<(usize, &'a str)>,
+    delimiter: char,
+    /// Mark before decimals.
+    point: char,
+}
+
+impl<'a> Trajectory<'a> {
+    /// Reads a motion of a robot; `place` names the text in faults. Fails with columns that are not known or missing, numbers that cannot
+    /// be read, times that do not grow in even steps.
+    pub fn read(place: &str, text: &'a str, robot: &RobotDescription) -> Result<Self> {
+        let text = text.trim_start_matches('\u{feff}');
+        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
+        let empty = || Error::data(place, "is empty; expected a header line and a motion");
+        let (number, header) = lines.next().ok_or_else(empty)?;
+        let delimiter = delimiter(header);
+        let at = |line: usize, message: String| Fault::new(format!("{place}:{line}"), message);
+        let names = fields(header, delimiter).map_err(|message| Error::Data(vec![at(number, message)]))?;
+        let names: Vec<String> = names.into_iter().map(|field| field.1.into_owned()).collect();
+        let columns = columns(place, &names, robot)?;
+        let mut trajectory =
+            Self { motion: empty_motion(robot.joints.len(), &columns), header, lines: lines.collect(), delimiter, point: '.' };
+        trajectory.fill(place, &columns)?;
+        trajectory.check_clock(place)?;
+        Ok(trajectory)
+    }
+
+    /// Reads all rows.
+    fn fill(&mut self, place: &str, columns: &[MotionColumn]) -> Result<()> {
+        let (n, rows) = (self.motion.joints, self.lines.len());
+        let mut faults = Vec::new();
+        for list in [&mut self.motion.velocity, &mut self.motion.acceleration].into_iter().flatten() {
+            list.resize(n * rows, 0.0);
+        }
+        self.motion.time.resize(rows, 0.0);
+        self.motion.position.resize(n * rows, 0.0);
+        for row in 0..rows {
+            let (number, line) = self.lines[row];
+            let mut fault = |message: String| {
+                if faults.len() < MOST {
+                    faults.push(Fault::new(format!("{place}:{number}"), message));
+                }
+            };
+            let cells = match fields(line, self.delimiter) {
+                Ok(cells) if cells.len() == columns.len() => cells,
+                Ok(cells) => {
+                    fault(format!("has {} cells, the header {}", cells.len(), columns.len()));
+                    continue;
+                }
+                Err(message) => {
+                    fault(message);
+                    continue;
+                }
+            };
+            for (column, (_, cell)) in columns.iter().zip(cells) {
+                let comma = self.delimiter != ',' && cell.contains(',');
+                let value = if comma { cell.replace(',', ".").parse::<f64>() } else { cell.parse::<f64>() };
+                let Some(value) = value.ok().filter(|value| value.is_finite()) else {
+                    fault(format!("`{cell}` is not a number"));
+                    continue;
+                };
+                if comma {
+                    self.point = ',';
+                }
+                put(&mut self.motion, row, *column, value);
+            }
+        }
+        if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+    }
+
+    /// Times must grow in even steps: derivatives are by differences of rows.
+    fn check_clock(&self, place: &str) -> Result<()> {
+        let time = &self.motion.time;
+        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let usual = crate::statistics::nearest(&mut steps, 0.5).unwrap_or(0.0);
+        let wrong = |row: usize, message: String| Err(Error::data(format!("{place}:{}", self.lines[row + 1].0), message));
+        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| pair[1] <= pair[0]) {
+            return wrong(row, format!("the time does not increase: {} s after {} s", pair[1], pair[0]));
+        }
+        let uneven = |pair: &[f64]| (pair[1] - pair[0] - usual).abs() > UNEVEN * usual;
+        if let Some((row, pair)) = time.windows(2).enumerate().find(|(_, pair)| uneven(pair)) {
+            let step = pair[1] - pair[0];
+            let message =
+                format!("the clock is uneven: a step of {step:.6} s, usual are {usual:.6} s; give the motion in even steps");
+            return wrong(row, message);
+        }
+        Ok(())
+    }
+
+    /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, and a remark for each row.
+    pub fn written(&self, needed: &NeededTorques, per_ampere: Option<&[f64]>, remarks: &[String]) -> String {
+        let n = self.motion.joints;
+        let (between, point) = (self.delimiter, self.point);
+        let mut text = self.header.trim_end().to_string();
+        (1..=n).for_each(|joint| text.push_str(&format!("{between}tau{joint}_nm")));
+        if per_ampere.is_some() {
+            (1..=n).for_each(|joint| text.push_str(&format!("{between}i{joint}_a")));
+        }
+        text.push_str(&format!("{between}remark\n"));
+        for (row, (_, line)) in self.lines.iter().enumerate() {
+            text.push_str(line.trim_end());
+            let own = &needed.torque[n * row..n * (row + 1)];
+            let mut number = |value: f64| {
+                text.push(between);
+                decimal::push(&mut text, value, DECIMALS, point);
+            };
+            own.iter().for_each(|torque| number(*torque));
+            if let Some(per_ampere) = per_ampere {
+                own.iter().zip(per_ampere).for_each(|(torque, factor)| number(torque / factor));
+            }
+            text.push(between);
+            text.push_str(&remarks[row]);
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// What only `dq` and `ddq` of all joints make.
+fn empty_motion(joints: usize, columns: &[MotionColumn]) -> PlannedMotion {
+    let has = |is: fn(&MotionColumn) -> bool| columns.iter().any(is).then(Vec::new);
+    PlannedMotion {
+        joints,
+        time: Vec::new(),
+        position: Vec::new(),
+        velocity: has(|column| matches!(column, MotionColumn::Velocity(..))),
+        acceleration: has(|column| matches!(column, MotionColumn::Acceleration(..))),
+        since_start: None,
+    }
+}
+
+/// Takes a number of a row.
+fn put(motion: &mut PlannedMotion, row: usize, column: MotionColumn, value: f64) {
+    let n = motion.joints;
+    let (list, joint, unit) = match column {
+        MotionColumn::Time(unit) => return motion.time[row] = unit * value,
+        MotionColumn::Position(joint, unit) => (Some(&mut motion.position), joint, unit),
+        MotionColumn::Velocity(joint, unit) => (motion.velocity.as_mut(), joint, unit),
+        MotionColumn::Acceleration(joint, unit) => (motion.acceleration.as_mut(), joint, unit),
+    };
+    if let Some(list) = list {
+        list[n * row + joint] = unit * value;
+    }
+}
+
+/// Endings of a column's name, with what a unit is in SI.
+const DEG: f64 = std::f64::consts::PI / 180.0;
+const TIMES: [(&str, f64); 2] = [("time_s", 1.0), ("time_ms", 1e-3)];
+const PER_JOINT: [(&str, &str, f64); 6] = [
+    ("ddq", "_deg_s2", DEG),
+    ("ddq", "_rad_s2", 1.0),
+    ("dq", "_deg_s", DEG),
+    ("dq", "_rad_s", 1.0),
+    ("q", "_deg", DEG),
+    ("q", "_rad", 1.0),
+];
+
+fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Vec<MotionColumn>> {
+    let n = robot.joints.len();
+    let mut faults = Vec::new();
+    let mut columns = Vec::new();
+    for name in names {
+        match column(name, robot) {
+            Some(column) if columns.iter().any(|known| same(known, &column)) => {
+                faults.push(Fault::new(place, format!("column `{name}` repeats what another column gives")));
+            }
+            Some(column) => columns.push(column),
+            None => faults.push(Fault::new(
+                place,
+                format!(
+                    "unknown column `{name}`; allowed: time_s or time_ms, q1_deg to q{n}_deg or _rad (or the robot's joint names), \
+                     dq1_deg_s or _rad_s, ddq1_deg_s2 or _rad_s2"
+                ),
+            )),
+        }
+    }
+    let count = |is: &dyn Fn(&MotionColumn) -> bool| columns.iter().filter(|column| is(column)).count();
+    if faults.is_empty() && count(&|column| matches!(column, MotionColumn::Time(_))) == 0 {
+        faults.push(Fault::new(place, "has no column time_s"));
+    }
+    for (what, needed, is) in [
+        ("q", true, (|column| matches!(column, MotionColumn::Position(..))) as fn(&MotionColumn) -> bool),
+        ("dq", false, |column| matches!(column, MotionColumn::Velocity(..))),
+        ("ddq", false, |column| matches!(column, MotionColumn::Acceleration(..))),
+    ] {
+        let found = count(&is);
+        if faults.is_empty() && found != n && (needed || found > 0) {
+            faults.push(Fault::new(place, format!("has columns {what} of {found} of the robot's {n} joints: give all of them")));
+        }
+    }
+    if faults.is_empty() { Ok(columns) } else { Err(Error::Spec(faults)) }
+}
+
+fn same(a: &MotionColumn, b: &MotionColumn) -> bool {
+    use MotionColumn::{Acceleration, Position, Time, Velocity};
+    match (a, b) {
+        (Time(_), Time(_)) => true,
+        (Position(a, _), Position(b, _)) | (Velocity(a, _), Velocity(b, _)) | (Acceleration(a, _), Acceleration(b, _)) => a == b,
+        _ => false,
+    }
+}
+
+fn column(name: &str, robot: &RobotDescription) -> Option<MotionColumn> {
+    let lower = name.trim().to_lowercase();
+    if let Some((_, unit)) = TIMES.iter().find(|(known, _)| *known == lower) {
+        return Some(MotionColumn::Time(*unit));
+    }
+    for (what, ending, unit) in PER_JOINT {
+        let Some(stem) = lower.strip_suffix(ending) else { continue };
+        let number = stem.strip_prefix(what).and_then(|number| number.parse::<usize>().ok());
+        let numbered = number.filter(|number| (1..=robot.joints.len()).contains(number)).map(|number| number - 1);
+        let named = || robot.joints.iter().position(|joint| what == "q" && joint.name.to_lowercase() == stem);
+        if let Some(joint) = numbered.or_else(named) {
+            return Some(match what {
+                "q" => MotionColumn::Position(joint, unit),
+                "dq" => MotionColumn::Velocity(joint, unit),
+                _ => MotionColumn::Acceleration(joint, unit),
+            });
+        }
+    }
+    None
+}

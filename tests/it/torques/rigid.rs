@@ -1,0 +1,77 @@
+//! Torques of rigid arms by other engines: MuJoCo's and Pinocchio's inverse dynamics (tests/reference/mujoco_dynamics.py).
+
+use calib::dynamics::{DynamicArm, INERTIAL_NUMBERS, InertialTolerance, InverseDynamics, MotionRow};
+use calib::twin::torque::rigid::{Body, JointState, Machine};
+use serde_json::Value;
+
+fn numbers<const N: usize>(value: &Value) -> [f64; N] {
+    std::array::from_fn(|k| value[k].as_f64().expect("a number"))
+}
+
+fn list(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+/// The ten numbers of a body about its joint's point, by the parallel-axis rule.
+fn ten(body: &Body, point: [f64; 3]) -> [f64; INERTIAL_NUMBERS] {
+    let r = [0, 1, 2].map(|k| body.centre[k] - point[k]);
+    let square: f64 = r.iter().map(|x| x * x).sum();
+    let entry = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+    std::array::from_fn(|k| match k {
+        0 => body.mass,
+        1..=3 => body.mass * r[k - 1],
+        _ => {
+            let (row, column) = entry[k - 4];
+            body.inertia[k - 4] + body.mass * (if row == column { square } else { 0.0 } - r[row] * r[column])
+        }
+    })
+}
+
+#[test]
+fn inverse_dynamics_of_estimator_and_twin_are_those_of_mujoco_and_pinocchio() {
+    let text = include_str!("rigid_arms.json");
+    let document: Value = serde_json::from_str(text).expect("JSON");
+    let arms = document["arms"].as_array().expect("arms");
+    assert_eq!(arms.len(), 3);
+    for told in arms {
+        let links = told["links"].as_array().expect("links");
+        let gravity: [f64; 3] = numbers(&told["gravity"]);
+        let axes: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["axis"])).collect();
+        let points: Vec<[f64; 3]> = links.iter().map(|link| numbers(&link["point"])).collect();
+        let body = |link: &Value| Body {
+            mass: link["mass"].as_f64().expect("kg"),
+            centre: numbers(&link["centre"]),
+            inertia: numbers(&link["inertia"]),
+        };
+        let bodies: Vec<Body> = links.iter().map(body).collect();
+        let theta: Vec<f64> = bodies.iter().zip(&points).flat_map(|(body, point)| ten(body, *point)).collect();
+        let tool = points[points.len() - 1];
+        let arm = DynamicArm {
+            axes: axes.iter().map(|axis| (*axis).into()).collect(),
+            points: points.iter().map(|point| (*point).into()).collect(),
+            prismatic: vec![false; links.len()],
+            tool: tool.into(),
+            links: None,
+            payload: None,
+            gravity: gravity.into(),
+            ratio: vec![1.0; links.len()],
+            coupled: Vec::new(),
+            tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+        };
+        let machine = Machine { axes, points, tool, links: bodies, payload: None, gravity };
+        let mut dynamics = InverseDynamics::new(&arm);
+        for row in told["rows"].as_array().expect("rows") {
+            let [q, v, a, mujoco, pinocchio] = ["q", "v", "a", "mujoco", "pinocchio"].map(|name| list(&row[name]));
+            let mut estimator = vec![0.0; q.len()];
+            dynamics.torque(MotionRow { position: &q, velocity: &v, acceleration: &a }, &arm.gravity, &theta, &mut estimator);
+            let twin = machine.torque(&JointState { q, v, a });
+            let largest = mujoco.iter().fold(1.0, |most: f64, torque| most.max(torque.abs()));
+            for own in [&estimator, &twin] {
+                for other in [&mujoco, &pinocchio] {
+                    let off = own.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off < 1e-9 * largest, "{off} Nm of {largest}");
+                }
+            }
+        }
+    }
+}
