@@ -1,7 +1,7 @@
 //! A case once more: the same arm with further physics, on other paths or on a motion that is given, and its truth in numbers.
 
 use super::draw::{TorqueCase, paths};
-use super::law::Law;
+use super::law::{Fall, Law};
 use super::path::Path;
 use super::record::TorqueRows;
 use super::rigid::{Body, JointState};
@@ -15,7 +15,7 @@ impl TorqueCase {
 
     /// The same arm with friction of a joint (from 0) that is greater at low speed (Nm), until so fast (rad/s).
     pub fn with_stribeck(self, joint: usize, size: f64, speed: f64) -> Self {
-        self.with(Law::Stribeck { joint, size, speed, exponent: 1.0 })
+        self.with(Law::Stribeck { joint, size, speed, fall: Fall::Exponential(1.0) })
     }
 
     /// The same arm with so much more Coulomb friction at a joint (from 0), Nm.
@@ -25,7 +25,6 @@ impl TorqueCase {
 
     fn with(mut self, law: Law) -> Self {
         self.laws.push(law);
-        self.other_form.push(false);
         self
     }
 

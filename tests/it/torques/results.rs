@@ -38,7 +38,16 @@ fn solved() -> &'static Solved {
 
 /// Friction at all joints and nothing else concealed, motor currents.
 pub(super) fn arm() -> TorqueCase {
-    let design = TorqueDesign { seed: 21, nulls: 0.0, other_forms: 0.0, most: 0, seconds: 48.0, rate: 100.0 };
+    let design = TorqueDesign {
+        seed: 21,
+        cases: 60,
+        nulls: 1.0,
+        pairs: 0.0,
+        open: 0.0,
+        other_forms: 0.0,
+        seconds: 48.0,
+        rate: 100.0,
+    };
     let fits =
         |case: &TorqueCase| case.robot.name == "compact6" && case.plain_friction().iter().all(|[v, c]| v.and(*c).is_some());
     (0..60).map(|number| TorqueCase::draw(&design, number)).find(fits).expect("an arm with friction at all joints")
