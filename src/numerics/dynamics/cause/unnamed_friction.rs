@@ -6,26 +6,8 @@ use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
 
-/// Half a wave and a whole one of speed, up to the fastest (shape, rad/s), with the sign of the velocity: what viscous and Coulomb friction
-/// leave of them, so that these keep their sizes.
+/// Half a wave and a whole one of speed, up to the fastest (shape, rad/s), with the sign of the velocity.
 pub(super) struct UnnamedFriction;
-
-/// Of the product of the squares of velocity and sign: below it both are one.
-const ALIKE: f64 = 1e-9;
-
-/// Takes velocity and sign off a column by least squares.
-fn beside_plain_friction(velocity: &[f64], sign: &[f64], out: &mut [f64]) {
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (vv, vs, ss) = (product(velocity, velocity), product(velocity, sign), product(sign, sign));
-    let (wv, ws) = (product(out, velocity), product(out, sign));
-    let determinant = vv * ss - vs * vs;
-    if determinant > ALIKE * vv * ss {
-        let (viscous, coulomb) = ((wv * ss - ws * vs) / determinant, (ws * vv - wv * vs) / determinant);
-        for ((value, v), s) in out.iter_mut().zip(velocity).zip(sign) {
-            *value -= viscous * v + coulomb * s;
-        }
-    }
-}
 
 impl TorqueCause for UnnamedFriction {
     fn name(&self) -> &'static str {
@@ -57,9 +39,7 @@ impl TorqueCause for UnnamedFriction {
         let waves = [1.0, 2.0][column / 2];
         let phase = |row: usize| PI * waves * velocity[row].abs() / form.shape[0];
         let wave = |row: usize| if column.is_multiple_of(2) { phase(row).sin() } else { phase(row).cos() };
-        let sign: Vec<f64> = velocity.iter().map(|velocity| scene.sign(*velocity)).collect();
-        fill(out, |row| sign[row] * wave(row));
-        beside_plain_friction(velocity, &sign, out);
+        fill(out, |row| scene.sign(velocity[row]) * wave(row));
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
