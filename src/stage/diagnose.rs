@@ -175,14 +175,7 @@ impl Stage for Diagnose {
         let mut diagnosis = said(diagnosis, &question, context)?;
         blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
-            let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
-            let rounded = rounded_logs(&diagnosis.model, &data, &points);
-            let events = brought::events(&diagnosis.model, &diagnosis.fitted, &data, &reads.recording, &diagnosis.kept);
-            for line in rounded.into_iter().chain(events) {
-                diagnosis.statement.push_str(&format!("; {line}"));
-                context.services.warn(line);
-            }
-            misplaced_tool(&diagnosis.model, &diagnosis.fitted).into_iter().for_each(|line| context.services.warn(line));
+            remark(&mut diagnosis, &data, &reads.recording, context);
         }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
@@ -219,6 +212,18 @@ impl Stage for Diagnose {
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })
     }
+}
+
+/// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
+fn remark(diagnosis: &mut Diagnosis, data: &Measurements, recording: &Recording, context: &Context) {
+    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
+    let rounded = rounded_logs(&diagnosis.model, data, &points);
+    let events = brought::events(&diagnosis.model, &diagnosis.fitted, data, recording, &diagnosis.kept);
+    for line in rounded.into_iter().chain(events) {
+        diagnosis.statement.push_str(&format!("; {line}"));
+        context.services.warn(line);
+    }
+    misplaced_tool(&diagnosis.model, &diagnosis.fitted).into_iter().for_each(|line| context.services.warn(line));
 }
 
 /// What is diagnosed, and what its parameters correct: the measurements, or what they differ by from an outside simulation.

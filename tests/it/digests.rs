@@ -25,6 +25,8 @@ const CONTROLLER: &str = "name,time,q1,q2,q3,q4,q5,q6\nA,0,0,-10,20,5,40,0\nB,10
 const TRACKER: &str =
     "name;x;y;z\nA;1834,112;-402,871;1290,455\nC;2034,5;-102,871;990,001\nC;2034,5;-102,871;990,001\nB;0;0;0\nE;1,0;2,0;3,0\n";
 
+/// Whose tables are read by ports that ask for an earlier recording: a motion that ends before the other does.
+const EARLIER: &str = "earlier";
 /// Each stage with the folder of its tables and its settings.
 const TRIALS: &[(&str, &str, &str)] = &[
     ("robot", "points", "{file: robot.yaml}"),
@@ -50,6 +52,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
     ("diagnose", "points", "{on: [fit]}"),
     ("ingest_torques", "torques", ""),
     ("diagnose_torques", "torques", "{}"),
+    ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),
     ("compare", "points", "{previous_parameters: parameters.parquet, previous_recording: recording.parquet}"),
     ("learn", "points", "{rivals: [ridge, curves, mlp], starts: [bso], ensemble: 1, generations: 10, iterations: 20, folds: 2}"),
@@ -192,7 +195,11 @@ fn run(entry: &StageEntry, name: &str, settings: &str) -> StageDigest {
     let desk = files.iter().fold(Desk::default(), |desk, (name, bytes)| desk.with(name, bytes.clone()));
     let all = tables(&folder);
     let mut frames = |port: &Port| {
-        let of_kind: Vec<_> = all.iter().filter(|(_, _, frame)| frame.kind() == port.kind).collect();
+        let is_earlier = |stage: &str| (stage == EARLIER) == port.name.starts_with(EARLIER);
+        let mut of_kind: Vec<_> = all.iter().filter(|(_, _, frame)| frame.kind() == port.kind).collect();
+        if of_kind.iter().any(|(stage, ..)| is_earlier(stage)) {
+            of_kind.retain(|(stage, ..)| is_earlier(stage));
+        }
         assert!(of_kind.len() == 1 || port.arity != Arity::One, "{}: {} tables {}", entry.name, of_kind.len(), port.kind);
         for (_, path, _) in &of_kind {
             inputs.update(&read(path.clone()));

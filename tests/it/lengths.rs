@@ -7,8 +7,6 @@ use std::path::Path;
 /// Lines of a file and of a function, at most.
 const FILE: usize = 400;
 const FUNCTION: usize = 80;
-/// What is longer still; nothing is added here, and what has become short is taken out.
-const LONGER: [&str; 1] = ["cli/simulate/conceal.rs: fn design"];
 
 /// Functions of a text with their lines, in rustfmt's style: a function ends where a brace stands under its first letter.
 fn functions(text: &str) -> Vec<(String, usize)> {
@@ -47,7 +45,7 @@ fn no_file_and_no_function_is_longer_than_one_reads() {
             functions(&text).into_iter().filter(|(_, lines)| *lines > FUNCTION).map(|(own, _)| format!("{name}: fn {own}")),
         );
     }
-    assert_eq!(longer, LONGER, "at most {FILE} lines a file and {FUNCTION} a function");
+    assert_eq!(longer, Vec::<String>::new(), "at most {FILE} lines a file and {FUNCTION} a function");
 }
 
 #[test]

@@ -101,16 +101,8 @@ fn the_example_of_a_pair_shows_the_tool_that_was_added() {
     let example = pair().join("example");
     let (mass, shift) = (1.2, [0.0, 0.0, -0.02]);
     if std::env::var_os("CALIB_UPDATE").is_some() {
-        let design = TorqueDesign {
-            seed: 11,
-            cases: 1,
-            nulls: 0.0,
-            pairs: 0.0,
-            open: 0.0,
-            other_forms: 0.0,
-            seconds: 24.0,
-            rate: 50.0,
-        };
+        let design =
+            TorqueDesign { seed: 11, cases: 1, nulls: 0.0, pairs: 0.0, open: 0.0, other_forms: 0.0, seconds: 24.0, rate: 50.0 };
         let before = TorqueCase::draw(&design, 0);
         let declared = before.last_bodies().1.expect("a payload");
         let after = before.on_other_paths(12, 24.0).carrying(mass, shift);
