@@ -86,7 +86,7 @@ impl IdentifiedArm {
     }
 
     /// Effects and places that depend on moves before the target, which no target states: they are taken as those of an arm that rested.
-    pub(super) fn by_earlier_moves(&self) -> Vec<String> {
+    pub fn by_earlier_moves(&self) -> Vec<String> {
         let (specs, x) = (self.model.stack.specs(), &self.model.x);
         let follows = |form: &Form| form.variables().into_iter().any(Variable::follows_earlier_moves);
         let effects = self.model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(follows));

@@ -170,7 +170,7 @@ impl Variable {
 
     /// Whether it follows from moves that no target states: from where the arm comes, or how fast it has moved.
     pub fn follows_earlier_moves(self) -> bool {
-        matches!(self, Self::Move { .. } | Self::LastMove | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. })
+        matches!(self, Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. })
     }
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.

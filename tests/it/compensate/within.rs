@@ -3,8 +3,10 @@
 use super::true_error::Cell;
 use crate::desk::{Desk, table};
 use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
-use calib::effect::Load;
+use calib::effect::{EffectStack, Form, Law, Load, Motion, Term, Unknown, Variable};
+use calib::estimate::Model;
 use calib::robot::RobotModel;
+use calib::spatial::Pose;
 use calib::stage::{Identify, IdentifyReads};
 use calib::table::{CovarianceTable, Parameters, Prediction};
 use calib::twin::conceal::robots::Kind;
@@ -61,4 +63,20 @@ fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_a_loaded_arm() {
     let share = within(&cell, &effects, &[0.0, 150.0]);
     println!("within the stated 95 %: {:.1} %", 100.0 * share);
     assert!((0.93..=0.97).contains(&share), "{share}");
+}
+
+#[test]
+fn a_finding_by_moves_before_a_target_is_named_and_one_without_a_size_is_not() {
+    let robot = RobotModel::new(Kind::Compact6.description([60.0, -45.0, 35.0]));
+    let arm = |of: Variable, size: f64| {
+        let form: Form = Term::new(&Unknown, Motion::Joint { joint: 2 }, Law::of(of)).into();
+        let stack = EffectStack::new(&robot, Pose::identity(), vec![Box::new(form)]);
+        let mut model = Model::nominal(robot.clone(), stack);
+        model.x[0] = size;
+        IdentifiedArm::new(model, None).by_earlier_moves()
+    };
+    let stretch = Variable::Stretch { joint: 2, limit: 0.2 };
+    assert_eq!(arm(stretch, 1e-4), ["unknown at joint 3"]);
+    assert_eq!(arm(stretch, 0.0), [""; 0]);
+    assert_eq!(arm(Variable::Angle { joint: 2 }, 1e-4), [""; 0]);
 }

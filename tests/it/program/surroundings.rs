@@ -111,3 +111,14 @@ fn joints_are_the_same_in_every_frame() {
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
     assert_eq!((program.literals()[0].kind, program.literals()[0].frame), (TargetKind::Joints, None));
 }
+
+#[test]
+fn the_targets_of_a_file_are_reached_with_one_tool() {
+    let said = |tool: &str| {
+        let targets = format!("{TOOLS}CONST robtarget p:=[[1,2,3],{REST};\nCONST robtarget r:=[[4,5,6],{REST};\n");
+        read(Language::Rapid, &format!("{targets}MoveL p,v1,z1,gun;\nMoveL r,v1,z1,{tool};")).1.join("\n")
+    };
+    assert_eq!(said("gun"), "");
+    let two = said("bare");
+    assert!(two.contains("is reached with the tool `BARE`, another target with `GUN`"), "{two}");
+}
