@@ -26,24 +26,22 @@ impl<'a> Bridged<'a> {
             return Self { recording: Cow::Borrowed(recording), origin: (0..rows).collect() };
         }
         let mut origin = Vec::with_capacity(rows + lost.iter().map(|(_, count)| count).sum::<usize>());
-        // Of each row: how far it is from its origin to the next recorded row, as a share.
+        // Of each row: how far it is from its origin to the next recorded row, as a share, and steps of the clock between these.
         let mut shares = Vec::with_capacity(origin.capacity());
         let mut next = lost.iter().peekable();
         for row in 0..rows {
             origin.push(row);
-            shares.push(0.0);
+            shares.push((0.0, 1.0));
             if let Some((_, count)) = next.next_if(|(before, _)| *before == row) {
                 origin.extend(std::iter::repeat_n(row, *count));
-                shares.extend((1..=*count).map(|k| k as f64 / (count + 1) as f64));
+                let steps = (count + 1) as f64;
+                shares.extend((1..=*count).map(|k| (k as f64 / steps, steps)));
             }
         }
         let between = |values: &[f64], width: usize| -> Vec<f64> {
-            let row = |(row, share): (&usize, &f64)| {
-                let (row, share) = (*row, *share);
-                (0..width).map(move |entry| {
-                    let now = values[row * width + entry];
-                    if share == 0.0 { now } else { now + share * (values[(row + 1) * width + entry] - now) }
-                })
+            let row = |(row, (share, steps)): (&usize, &(f64, f64))| {
+                let weights = weights(recording, *row, *share, *steps);
+                (0..width).map(move |entry| weights.iter().map(|(at, weight)| weight * values[at * width + entry]).sum())
             };
             origin.iter().zip(&shares).flat_map(row).collect()
         };
@@ -68,6 +66,26 @@ impl<'a> Bridged<'a> {
         (made_up > 0)
             .then(|| format!("bridged between their neighbours: {} of the clock without a row", counted(made_up, "step")))
     }
+}
+
+/// Recorded rows with their weights of a row that is so far from one to the next: of the cubic through two on either side, since a straight
+/// line has a jump of speed at its ends; of the straight line where a stretch begins or ends there.
+fn weights(recording: &TorqueRecording, row: usize, share: f64, steps: f64) -> Vec<(usize, f64)> {
+    if share == 0.0 {
+        return vec![(row, 1.0)];
+    }
+    let trajectory = &recording.trajectory;
+    let goes_on = row >= 1 && row + 2 < trajectory.len() && trajectory[row - 1] == trajectory[row + 2];
+    let nodes: Vec<(usize, f64)> = if goes_on {
+        vec![(row - 1, -1.0), (row, 0.0), (row + 1, steps), (row + 2, steps + 1.0)]
+    } else {
+        vec![(row, 0.0), (row + 1, steps)]
+    };
+    let at = share * steps;
+    let weight = |own: f64| -> f64 {
+        nodes.iter().filter(|(_, other)| *other != own).map(|(_, other)| (at - other) / (own - other)).product()
+    };
+    nodes.iter().map(|(row, own)| (*row, weight(*own))).collect()
 }
 
 /// Rows after which some are lost, and how many.
