@@ -85,10 +85,11 @@ impl IdentifiedArm {
         })
     }
 
-    /// Effects and places that depend on moves before the target, which no target states: they are taken as those of an arm that rested.
-    pub fn by_earlier_moves(&self) -> Vec<String> {
+    /// Effects and places that depend on what no target states: on moves before it, as of an arm that rested, or on another circumstance, which
+    /// counts for nothing.
+    pub fn by_what_is_not_stated(&self) -> Vec<String> {
         let (specs, x) = (self.model.stack.specs(), &self.model.x);
-        let follows = |form: &Form| form.variables().into_iter().any(Variable::follows_earlier_moves);
+        let follows = |form: &Form| form.variables().into_iter().any(Variable::is_no_targets);
         let effects = self.model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(follows));
         let moved = effects.filter_map(|(effect, mut range)| range.find(|k| x[*k] != 0.0).map(|k| (effect.name(), k)));
         moved.map(|(name, k)| format!("{name} at {}", specs[k].place)).collect::<BTreeSet<String>>().into_iter().collect()

@@ -80,8 +80,8 @@ pub struct Corrector<'a> {
     manner: CorrectionOptions,
     /// What of the model depends on motor currents.
     by_current: Option<String>,
-    /// What of it depends on moves before a target.
-    by_earlier_moves: Vec<String>,
+    /// What of it depends on what no target states.
+    by_what_is_not_stated: Vec<String>,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
@@ -167,9 +167,9 @@ impl<'a> Corrector<'a> {
         manner: CorrectionOptions,
     ) -> Self {
         let (joints, by_current) = (arm.model().robot.joints(), arm.by_current());
-        let by_earlier_moves = arm.by_earlier_moves();
+        let by_what_is_not_stated = arm.by_what_is_not_stated();
         let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
-        Self { arm, coverage, uncertainty, manner, by_current, by_earlier_moves, last: None, direction, tally }
+        Self { arm, coverage, uncertainty, manner, by_current, by_what_is_not_stated, last: None, direction, tally }
     }
 
     /// Whether targets get an uncertainty.
@@ -272,8 +272,8 @@ impl<'a> Corrector<'a> {
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             remarks.extend(certainty.iter().flat_map(Remark::of_certainty));
-            let earlier = Some(&self.by_earlier_moves).filter(|findings| !findings.is_empty());
-            remarks.extend(earlier.cloned().map(Remark::EarlierMoves));
+            let open = Some(&self.by_what_is_not_stated).filter(|findings| !findings.is_empty());
+            remarks.extend(open.cloned().map(Remark::NotStated));
             let share = reach.share();
             if share < 1.0 {
                 remarks.push(Remark::Faded(share));

@@ -21,8 +21,8 @@ pub enum Remark {
     Uncertain(f64, f64, Option<String>),
     /// A finding that is used beyond what was fitted, and over what.
     BeyondFitted(String, String),
-    /// Findings that depend on moves before the target, which nobody stated.
-    EarlierMoves(Vec<String>),
+    /// Findings that depend on what no target states.
+    NotStated(Vec<String>),
     /// The share of the learned correction that applies.
     Faded(f64),
     /// Beyond a limit: no joints are written.
@@ -54,8 +54,8 @@ impl fmt::Display for Remark {
                 finding.as_ref().map_or(Ok(()), |finding| write!(f, ", most of it by {finding}"))
             }
             Self::BeyondFitted(finding, variable) => write!(f, "{finding} beyond the {variable} that was fitted"),
-            Self::EarlierMoves(findings) => {
-                write!(f, "{} without the moves before, which no target states", findings.join(", "))
+            Self::NotStated(findings) => {
+                write!(f, "{} without what no target states (moves before it, other circumstances)", findings.join(", "))
             }
             Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
             Self::Refused(reason) => write!(f, "refused: {reason}"),

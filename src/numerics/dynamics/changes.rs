@@ -4,7 +4,6 @@
 use super::arm::DynamicArm;
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
 use super::clock::RecordingClock;
-use super::coefficients::coefficient_names;
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
@@ -106,7 +105,7 @@ fn shared_forms(first: &TorqueModel, second: &TorqueModel) -> Result<Vec<TorqueF
     let mut forms: Vec<TorqueForm> = Vec::new();
     for term in first.terms.iter().chain(&second.terms) {
         let form = term.form()?;
-        if !forms.iter().any(|known| known.is_called_as(&form) && known.with == form.with) {
+        if !forms.iter().any(|known| known.is_called_as(&form) && known.with == form.with && known.cause.has_shape(&form.shape)) {
             forms.push(form);
         }
     }
@@ -217,7 +216,7 @@ fn told(
         return all;
     };
     let form = &problem.all.forms[form];
-    let names = coefficient_names(form);
+    let names = form.coefficient_names();
     let of = |(place, (quantity, unit)): (usize, (String, &'static str))| {
         let name = format!("{}.{}.{quantity}", form.cause.name(), form.place.tag());
         number(name, form.cause.name(), form.place, unit, values[place], covariance[place * (count + 1)].max(0.0).sqrt())

@@ -19,6 +19,13 @@ pub(super) struct RecordingClock {
 }
 
 impl RecordingClock {
+    /// Of a motion of one trajectory in even steps, s.
+    pub fn even(time: &[f64]) -> Self {
+        let rows = time.len();
+        let rate = (rows - 1) as f64 / (time[rows - 1] - time[0]);
+        Self { rate, stretches: std::iter::once(0..rows).collect() }
+    }
+
     /// Of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
         let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();

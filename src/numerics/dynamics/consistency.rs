@@ -9,6 +9,8 @@ use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
 /// Mass below which there is no centre, kg.
 const LIGHTEST: f64 = 1e-9;
+/// Of the mass times the square of the distance (m2): the least second moment that a nearest body is given.
+const LEAST_SPREAD: f64 = 1e-4;
 /// Of a number's standard deviation: step of a derivative.
 const STEP: f64 = 1e-3;
 
@@ -44,6 +46,13 @@ impl TorqueModel {
         whole.then(|| body_of(self.ten(link)))
     }
 
+    /// A link as the body nearest to its numbers, with their mass and centre, m from its joint's point, and whether it is theirs; `None`
+    /// where they are not all identified or have no mass.
+    pub fn nearest_body(&self, link: usize) -> Option<(Inertial, bool)> {
+        let ten = self.is_whole(link).then(|| self.ten(link)).filter(|ten| ten[0] > 0.0)?;
+        Some(nearest(ten))
+    }
+
     /// The ten numbers of a link.
     pub fn ten(&self, link: usize) -> &[f64] {
         &self.inertials[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)]
@@ -77,6 +86,18 @@ impl TorqueModel {
     }
 }
 
+/// The body nearest to numbers with a mass, and whether it is theirs.
+fn nearest(ten: &[f64]) -> (Inertial, bool) {
+    let body = body_of(ten);
+    let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia).symmetric_eigen();
+    if moments.eigenvalues.min() >= 0.0 {
+        return (body, true);
+    }
+    let kept = Matrix3::from_diagonal(&moments.eigenvalues.map(|moment| moment.max(LEAST_SPREAD * body.mass)));
+    let spread = moments.eigenvectors * kept * moments.eigenvectors.transpose();
+    (Inertial { inertia: Matrix3::identity() * spread.trace() - spread, ..body }, false)
+}
+
 /// Least second moment of mass about the centre.
 fn spread(ten: &[f64]) -> f64 {
     let about = body_of(ten).inertia;
@@ -101,6 +122,17 @@ pub fn inertial_numbers(body: &Inertial) -> [f64; INERTIAL_NUMBERS] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_no_body_become_those_of_the_nearest_with_the_same_mass_and_centre() {
+        // A rod along x of 3 kg whose moment about its own axis is negative.
+        let (body, own) = nearest(&[3.0, 0.3, 0.0, 0.0, -0.01, 0.0, 0.0, 0.05 + 0.03, 0.0, 0.05 + 0.03]);
+        assert!((body.centre - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-15 && body.mass == 3.0 && !own);
+        let [xx, yy, zz] = [0, 1, 2].map(|k| body.inertia[(k, k)]);
+        assert!(xx > 0.0 && xx + yy >= zz && xx + zz >= yy && yy + zz >= xx, "{}", body.inertia);
+        let (right, own) = nearest(&[3.0, 0.3, 0.0, 0.0, 0.01, 0.0, 0.0, 0.08, 0.0, 0.08]);
+        assert!(own && (right.inertia[(0, 0)] - 0.01).abs() < 1e-12 && (right.inertia[(1, 1)] - 0.05).abs() < 1e-12);
+    }
 
     #[test]
     fn a_ball_has_its_spread_and_a_hollow_impossible_body_none() {

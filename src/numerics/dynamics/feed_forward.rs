@@ -75,20 +75,9 @@ impl TorqueModel {
 
     /// The motion as causes see it.
     fn scene<'a>(&self, arm: &'a DynamicArm, motion: &PlannedMotion) -> DynamicScene<'a> {
-        let (n, rows) = (motion.joints, motion.time.len());
-        let recording = TorqueRecording {
-            joints: n,
-            time: motion.time.clone(),
-            position: motion.position.clone(),
-            velocity: None,
-            torque: Vec::new(),
-            temperature: None,
-            trajectory: vec![1; rows],
-            held_out: vec![false; rows],
-            from_current: false,
-        };
-        let rate = (rows - 1) as f64 / (motion.time[rows - 1] - motion.time[0]);
-        let clock = RecordingClock { rate, stretches: std::iter::once(0..rows).collect() };
+        let n = motion.joints;
+        let recording = TorqueRecording::of_motion(n, motion.time.clone(), motion.position.clone());
+        let clock = RecordingClock::even(&motion.time);
         let mut scene = DynamicScene::new(arm, &recording, &clock, self.cutoff, false);
         scene.sign_width = self.sign_width;
         let begun = motion.since_start.unwrap_or(LONG_AGO);

@@ -11,7 +11,6 @@ mod changes;
 mod check;
 mod choice;
 mod clock;
-mod coefficients;
 mod columns;
 mod consistency;
 mod contact;

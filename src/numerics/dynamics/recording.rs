@@ -24,6 +24,22 @@ pub struct TorqueRecording {
 }
 
 impl TorqueRecording {
+    /// A motion of one trajectory without torques, s and rad, positions row-major.
+    pub(super) fn of_motion(joints: usize, time: Vec<f64>, position: Vec<f64>) -> Self {
+        let rows = time.len();
+        Self {
+            joints,
+            time,
+            position,
+            velocity: None,
+            torque: Vec::new(),
+            temperature: None,
+            trajectory: vec![1; rows],
+            held_out: vec![false; rows],
+            from_current: false,
+        }
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time.len()

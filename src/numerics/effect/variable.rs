@@ -168,9 +168,10 @@ impl Variable {
         matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })
     }
 
-    /// Whether it follows from moves that no target states: from where the arm comes, or how fast it has moved.
-    pub fn follows_earlier_moves(self) -> bool {
-        matches!(self, Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. })
+    /// Whether no target states it: it follows from the moves before, or is a circumstance that targets have no column for.
+    pub fn is_no_targets(self) -> bool {
+        let by_moves = matches!(self, Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. });
+        by_moves || matches!(self, Self::Circumstance { .. })
     }
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.

@@ -5,7 +5,7 @@ use crate::desk::{Desk, table};
 use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
 use calib::effect::{EffectStack, Form, Law, Load, Motion, Term, Unknown, Variable};
 use calib::estimate::Model;
-use calib::robot::RobotModel;
+use calib::robot::{CircumstanceName, RobotModel};
 use calib::spatial::Pose;
 use calib::stage::{Identify, IdentifyReads};
 use calib::table::{CovarianceTable, Parameters, Prediction};
@@ -66,17 +66,19 @@ fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_a_loaded_arm() {
 }
 
 #[test]
-fn a_finding_by_moves_before_a_target_is_named_and_one_without_a_size_is_not() {
+fn a_finding_by_what_no_target_states_is_named_and_one_without_a_size_is_not() {
     let robot = RobotModel::new(Kind::Compact6.description([60.0, -45.0, 35.0]));
     let arm = |of: Variable, size: f64| {
         let form: Form = Term::new(&Unknown, Motion::Joint { joint: 2 }, Law::of(of)).into();
         let stack = EffectStack::new(&robot, Pose::identity(), vec![Box::new(form)]);
         let mut model = Model::nominal(robot.clone(), stack);
         model.x[0] = size;
-        IdentifiedArm::new(model, None).by_earlier_moves()
+        IdentifiedArm::new(model, None).by_what_is_not_stated()
     };
     let stretch = Variable::Stretch { joint: 2, limit: 0.2 };
     assert_eq!(arm(stretch, 1e-4), ["unknown at joint 3"]);
     assert_eq!(arm(stretch, 0.0), [""; 0]);
     assert_eq!(arm(Variable::Angle { joint: 2 }, 1e-4), [""; 0]);
+    let humidity = Variable::Circumstance { column: CircumstanceName::of("humidity").expect("a column"), joint: None };
+    assert_eq!(arm(humidity, 1e-4), ["unknown at joint 3"]);
 }

@@ -1,6 +1,6 @@
 //! Friction that is greater in one direction of motion.
 
-use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -35,6 +35,10 @@ impl TorqueCause for Asymmetric {
 
     fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {
         Some(sign.max(0.0))
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("asymmetry", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! Friction of one size against the direction of motion.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -34,6 +34,10 @@ impl TorqueCause for Coulomb {
 
     fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {
         Some(sign)
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("coulomb", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

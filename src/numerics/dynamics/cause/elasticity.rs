@@ -1,6 +1,6 @@
 //! A joint that swings: its torque is that of the rigid arm behind a resonance.
 
-use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
@@ -62,6 +62,10 @@ impl TorqueCause for Elasticity {
                 out[row] = output - input;
             }
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("share", "1")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! A base that does not stand as declared.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, shape};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, shape};
 use crate::dynamics::scene::{DynamicScene, GRAVITY};
 use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
@@ -32,6 +32,10 @@ impl TorqueCause for GravityDirection {
 
     fn write(&self, _form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         out.copy_from_slice(&scene.sideways[column][joint]);
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("side_x", "1"), ("side_y", "1")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

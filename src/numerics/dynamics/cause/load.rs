@@ -1,6 +1,6 @@
 //! Friction that grows with the torque that a gear transmits.
 
-use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -39,6 +39,10 @@ impl TorqueCause for LoadFriction {
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
         fill(out, |row| scene.sign(scene.velocity[joint][row]) * scene.rigid[joint][row].abs());
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("share", "1")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -136,11 +136,22 @@ pub(super) trait TorqueCause: Sync {
     fn friction(&self, _form: &TorqueForm, _velocity: f64, _sign: f64) -> Option<f64> {
         None
     }
+    /// Whether its forms have such shape numbers, by which causes of one name are known from each other.
+    fn has_shape(&self, _shape: &[f64]) -> bool {
+        true
+    }
+    /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[]
+    }
     /// Its numbers as people read them.
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter>;
     /// A sentence without a full stop, with its size.
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String;
 }
+
+/// Quantity and unit of a coefficient.
+pub(super) type CoefficientName = (&'static str, &'static str);
 
 /// A coefficient and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,6 +201,16 @@ impl TorqueForm {
     /// Whether both are the same cause at the same place.
     pub fn is_called_as(&self, other: &Self) -> bool {
         self.cause.name() == other.cause.name() && self.place == other.place
+    }
+
+    /// What its coefficients are called, one a column, with their units.
+    pub fn coefficient_names(&self) -> Vec<(String, &'static str)> {
+        let known = self.cause.coefficients();
+        let name = |column: usize| match known.get(column) {
+            Some((quantity, unit)) => ((*quantity).to_string(), *unit),
+            None => (format!("coefficient_{}", column + 1), "1"),
+        };
+        (0..self.width).map(name).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -29,6 +29,10 @@ impl TorqueCause for Offset {
 
     fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         out.fill(1.0);
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("offset", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! Friction that turns with the direction of motion only after a travel, and is kept at rest.
 
-use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -54,6 +54,10 @@ impl TorqueCause for PreslidingFriction {
                 out[row] = kept - scene.sign(velocity[row]);
             }
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("kept", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, fill, shape};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -59,6 +59,10 @@ impl TorqueCause for Ripple {
             0 => fill(out, |row| (periods * angle[row]).cos()),
             _ => fill(out, |row| (periods * angle[row]).sin()),
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("cosine", "Nm"), ("sine", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

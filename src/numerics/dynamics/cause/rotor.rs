@@ -1,6 +1,6 @@
 //! Inertia of a motor and its gear, as the joint feels it.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -38,6 +38,10 @@ impl TorqueCause for Rotor {
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
         out.copy_from_slice(&scene.acceleration[joint]);
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("inertia", "kg m2")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

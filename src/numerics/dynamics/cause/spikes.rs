@@ -1,6 +1,6 @@
 //! Lost motion: a knock after each reversal of a joint.
 
-use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -54,6 +54,10 @@ impl TorqueCause for Spikes {
                 }
             }
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("height", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

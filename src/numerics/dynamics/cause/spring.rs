@@ -1,6 +1,6 @@
 //! Torque that grows with the angle of a joint: a balancing spring at joint 2, a cable or hose elsewhere.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -37,6 +37,10 @@ impl TorqueCause for SpringTorque {
             0 => out.copy_from_slice(&scene.position[form.joint()]),
             _ => out.fill(1.0),
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("stiffness", "Nm/rad"), ("at_zero", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

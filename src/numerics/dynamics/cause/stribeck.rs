@@ -1,6 +1,6 @@
 //! Friction that is greater at low speed and falls as the joint gets faster.
 
-use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
+use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -43,6 +43,10 @@ impl TorqueCause for Stribeck {
 
     fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {
         Some(sign * (-velocity.abs() / form.shape[0]).exp())
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("stribeck", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! A current that stands for another torque than declared.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -36,6 +36,10 @@ impl TorqueCause for TorqueConstant {
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
         out.copy_from_slice(&scene.rigid[joint]);
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("relative", "1")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! What has no name: a smooth torque at a joint, in the angles of two joints.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, fill, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -48,6 +48,14 @@ impl TorqueCause for Unnamed {
             2 => fill(out, |row| first[row].cos() * (2.0 * second[row]).sin()),
             _ => fill(out, |row| first[row].cos() * (2.0 * second[row]).cos()),
         }
+    }
+
+    fn has_shape(&self, shape: &[f64]) -> bool {
+        shape.is_empty()
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("sin_sin", "Nm"), ("sin_cos", "Nm"), ("cos_sin", "Nm"), ("cos_cos", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

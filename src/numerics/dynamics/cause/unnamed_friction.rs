@@ -1,7 +1,7 @@
 //! Friction without a name: a smooth curve of speed beside viscous and Coulomb friction.
 
 use super::unknown::UNKNOWN;
-use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, VISCOUS, fill, plain};
+use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, VISCOUS, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
@@ -37,9 +37,18 @@ impl TorqueCause for UnnamedFriction {
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
         let waves = [1.0, 2.0][column / 2];
-        let phase = |row: usize| PI * waves * velocity[row].abs() / form.shape[0];
+        // Faster than any row it stays what it was at the fastest.
+        let phase = |row: usize| PI * waves * (velocity[row].abs() / form.shape[0]).min(1.0);
         let wave = |row: usize| if column.is_multiple_of(2) { phase(row).sin() } else { phase(row).cos() };
         fill(out, |row| scene.sign(velocity[row]) * wave(row));
+    }
+
+    fn has_shape(&self, shape: &[f64]) -> bool {
+        shape.len() == 1
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! Friction that grows with the velocity of a joint.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -34,6 +34,10 @@ impl TorqueCause for Viscous {
 
     fn friction(&self, _form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
         Some(velocity)
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("viscous", "Nm s/rad")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

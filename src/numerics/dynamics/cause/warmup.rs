@@ -1,6 +1,6 @@
 //! Friction that falls while the gear warms up.
 
-use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
+use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -52,6 +52,10 @@ impl TorqueCause for Warmup {
             0 => fill(out, |row| decay(row) * velocity[row]),
             _ => fill(out, |row| decay(row) * scene.sign(velocity[row])),
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

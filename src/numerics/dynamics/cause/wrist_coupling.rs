@@ -1,6 +1,6 @@
 //! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
 
-use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
+use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -68,6 +68,10 @@ impl TorqueCause for WristCoupling {
             let together = scene.velocity[moved][row] + ratio * scene.velocity[by][row];
             *value = share * if column == 0 { together } else { scene.sign(together) };
         }
+    }
+
+    fn coefficients(&self) -> &'static [CoefficientName] {
+        &[("viscous", "Nm s/rad"), ("coulomb", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

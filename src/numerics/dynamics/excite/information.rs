@@ -36,20 +36,8 @@ pub(super) struct MotionInformation {
 /// Base parameters of an arm, from a motion that moves all joints.
 pub(super) fn base_of(arm: &DynamicArm, basis: &SeriesBasis, series: &JointSeries) -> Vec<usize> {
     let (n, motion) = (arm.joints(), basis.motion(series));
-    let rows = motion.time.len();
-    let recording = TorqueRecording {
-        joints: n,
-        time: motion.time,
-        position: motion.position,
-        velocity: None,
-        torque: Vec::new(),
-        temperature: None,
-        trajectory: vec![1; rows],
-        held_out: vec![false; rows],
-        from_current: false,
-    };
-    let rate = (rows - 1) as f64 / (recording.time[rows - 1] - recording.time[0]);
-    let clock = RecordingClock { rate, stretches: std::iter::once(0..rows).collect() };
+    let recording = TorqueRecording::of_motion(n, motion.time, motion.position);
+    let clock = RecordingClock::even(&recording.time);
     let scene = DynamicScene::new(arm, &recording, &clock, CUTOFF, true);
     base_parameters(&ReducedRegressor::of(&scene, &Reduction::new(&clock, CUTOFF)))
 }
