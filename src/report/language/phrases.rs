@@ -62,13 +62,20 @@ impl Pattern {
         self.pieces.iter().map(|piece| if let Piece::Letters(letters) = piece { letters.len() } else { 0 }).sum()
     }
 
-    /// The other language with its holes filled.
+    /// The other language with its holes filled; braces around anything but a number are letters.
     fn filled(&self, holes: &[String]) -> String {
         let mut parts = self.other.split('{');
         let mut out = parts.next().unwrap_or_default().to_string();
-        for (k, part) in parts.enumerate() {
-            let (number, after) = part.split_once('}').unwrap_or(("", part));
-            let hole = number.parse().map_or(k, |number: usize| number.saturating_sub(1));
+        let mut next = 0;
+        for part in parts {
+            let hole = part.split_once('}').filter(|(number, _)| number.chars().all(|c| c.is_ascii_digit()));
+            let Some((number, after)) = hole else {
+                out.push('{');
+                out.push_str(part);
+                continue;
+            };
+            let hole = number.parse().map_or(next, |number: usize| number.saturating_sub(1));
+            next += 1;
             out.push_str(holes.get(hole).map_or("", String::as_str));
             out.push_str(after);
         }
