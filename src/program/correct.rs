@@ -1,6 +1,6 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
-use super::literal::JOINTS;
+use super::JOINTS;
 use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
 use crate::compensate::Corrector;
 use crate::compensate::unstated_payload;

@@ -12,12 +12,14 @@ mod literal;
 pub mod mark;
 mod pose;
 mod rapid;
+mod stated;
 mod token;
 
 pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
-pub use literal::{Literal, PostureStatement, TargetKind};
+pub use literal::{Literal, TargetKind};
 pub use pose::solve;
+pub use stated::PostureStatement;
 
 use std::ops::Range;
 
@@ -59,11 +61,11 @@ pub enum Frames {
     Assumed,
 }
 
+/// Joints that both languages have targets for.
+const JOINTS: usize = 6;
+
 /// Brackets in brackets, at most: targets in arrays of three dimensions have six.
 const DEPTH: usize = 16;
-
-/// Said once a program.
-const STATUS: &str = "S is not checked: it needs the arm's geometry; targets are reached in the posture that T states";
 
 /// Something said of a place in a program; line and column count from 1, columns in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -101,6 +103,8 @@ pub struct Program<'p> {
 pub struct SolvedLiteral {
     /// The corrected numbers, in the units and the order of [`Literal::values`].
     pub values: Vec<f64>,
+    /// The posture in which it is reached, stated as [`Literal::posture`] is.
+    pub posture: PostureStatement,
     /// What is to be known of it; empty if nothing.
     pub remark: String,
 }
@@ -122,8 +126,6 @@ struct Gathered {
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
     frames: Vec<(usize, String)>,
-    /// Where a status (S) stands first.
-    status: Option<usize>,
 }
 
 /// What a language's reader finds declared under names: one for each literal.
@@ -176,7 +178,6 @@ impl<'p> Program<'p> {
             return Err(refusal);
         }
         found.literals.sort_by_key(|literal| literal.at());
-        found.warnings.extend(found.status.map(|at| (at, STATUS.into())));
         let frames = placed(bytes, found.frames);
         let mut warnings = placed(bytes, found.warnings);
         warnings.extend(frames.iter().cloned());
@@ -227,7 +228,7 @@ impl<'p> Program<'p> {
                     continue;
                 }
             };
-            for (span, text) in literal.replacements(&solved.values) {
+            for (span, text) in literal.replacements(self.bytes, &solved) {
                 bytes.extend_from_slice(&self.bytes[from..span.start]);
                 // `A1-0.1`: the sign parts the name from the number.
                 if bytes.last().is_some_and(u8::is_ascii_alphanumeric) && !text.starts_with('-') {

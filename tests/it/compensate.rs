@@ -8,6 +8,8 @@ mod doubtful;
 mod gate;
 mod maker;
 mod posture;
+mod round_trip;
+mod sides;
 mod standing;
 mod stated;
 mod true_error;

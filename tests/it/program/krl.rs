@@ -124,7 +124,6 @@ fn what_a_program_sets_that_calib_took_for_granted_is_told_by_line() {
             format!("1:1: sets $BASE: {base}"),
             format!("2:1: sets $TOOL: {tool}"),
             format!("4:1: sets $TOOL: {tool}"),
-            "5:33: S is not checked: it needs the arm's geometry; targets are reached in the posture that T states".into(),
             "5:48: E1 is 1500: calib assumed that external axes stand at 0 and do not move the robot".into(),
             format!("5:68: sets $TOOL: {tool}"),
             "5:101: sets $IPO_MODE: calib assumed that the robot carries the tool (#BASE)".into(),
