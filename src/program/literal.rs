@@ -1,6 +1,7 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 
 use super::SolvedLiteral;
+use super::force::ToolInForce;
 use super::stated::{self, PostureStatement};
 use crate::robot::Bound;
 use crate::spatial::Pose;
@@ -34,6 +35,10 @@ pub struct Literal {
     pub posture_spans: Vec<Range<usize>>,
     /// The frame that a Cartesian target stands in, in the robot's base (m); none: the base itself.
     pub frame: Option<Pose>,
+    /// The tool that reaches a Cartesian target, in the frame of the robot file's tool (m); none: that one itself.
+    pub tool: Option<Pose>,
+    /// As the program has it.
+    pub(super) tool_in_force: Option<ToolInForce>,
     /// The mass at the flange that the program states, kg.
     pub payload: Option<f64>,
 }

@@ -1,6 +1,6 @@
 //! The numbers of a program as targets of the arm, and commands as numbers of a program.
 //!
-//! Cartesian targets are taken as poses of the robot file's tool in the frame that the program states, else in the robot's base. They stay Cartesian: the pose at which the
+//! Cartesian targets are poses of the tool in force in the frame that the program states, else of the robot file's tool, in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
 use super::stated::PostureReader;
@@ -51,6 +51,7 @@ fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
     let stated = CommandTarget { payload: literal.payload, ..CommandTarget::default() };
     let posed = |rotation: Matrix3<f64>| {
         let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * 1e-3);
+        let pose = pose * literal.tool.unwrap_or_else(Pose::identity).inverse();
         let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
         CommandTarget { point, rotation, posture: reader.posture(literal.posture), ..stated.clone() }
     };
@@ -71,6 +72,7 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
     let mut own = q.to_vec();
     convention.to_robot(&mut own);
     let pose = literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
+    let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
     let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];

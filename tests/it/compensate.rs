@@ -5,6 +5,7 @@ mod controller_list;
 mod counting;
 mod counting_said;
 mod doubtful;
+mod framed;
 mod gate;
 mod maker;
 mod posture;

@@ -1,5 +1,6 @@
 //! Programs of controllers: what is read as a target, what is refused, and that nothing but numbers of targets changes.
 
+mod flow;
 mod krl;
 mod random;
 mod rapid;

@@ -4,7 +4,10 @@ use super::ROBOT;
 use super::maker::Maker;
 use super::true_error::Cell;
 use calib::compensate::{CorrectionOptions, Corrector, Gate, IdentifiedArm, Nominal, ToolGoal, least_change, turns};
-use calib::program::{Frames, Language, Literal, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, Rewritten, corrected};
+use calib::program::{
+    Companion, Frames, Language, Literal, Partial, Program, ProgramFile, ProgramLoad, ProgramRules, Rewritten, RobotTool,
+    corrected,
+};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
@@ -36,6 +39,18 @@ impl Trip {
 
     /// A program as `calib compensate` writes it; the reasons where it is refused.
     pub fn compensated(&self, maker: &Maker, language: Language, text: &str) -> Result<Rewritten, String> {
+        self.compensated_by(maker, language, text, &[], None)
+    }
+
+    /// The same of a program of several files, with the robot file's tool as it is stated.
+    pub fn compensated_by(
+        &self,
+        maker: &Maker,
+        language: Language,
+        text: &str,
+        companions: &[Companion],
+        tool: Option<RobotTool>,
+    ) -> Result<Rewritten, String> {
         let manner = CorrectionOptions {
             convention: maker.convention(),
             cartesian: false,
@@ -51,8 +66,8 @@ impl Trip {
             gate: Gate { insisted: true, ..Gate::default() },
         };
         let mut corrector = Corrector::new(&self.arm, None, None, manner);
-        let rules = ProgramRules { partial: Partial::Refused, frames: Frames::Refused, load: ProgramLoad::Optional };
-        let source = ProgramFile { place: "program", text: text.as_bytes(), language };
+        let rules = ProgramRules { partial: Partial::Refused, frames: Frames::Refused, load: ProgramLoad::Optional, tool };
+        let source = ProgramFile { place: "program", text: text.as_bytes(), language, companions };
         corrected(&source, rules, self.robot.description(), &mut corrector).map_err(|error| error.to_string())
     }
 
