@@ -86,6 +86,10 @@ impl Flow {
         if let Some(block) = builder.blocks.last() {
             return Err(block.head);
         }
+        // The last routine of a piece of a program.
+        if let (Some((name, first)), Some(last)) = (builder.inside.take(), lines.len().checked_sub(1)) {
+            builder.routines.insert(name, (first, last));
+        }
         for (at, label) in std::mem::take(&mut builder.jumps) {
             let to = *builder.labels.get(&label).ok_or(at)?;
             builder.next[at].push(to);

@@ -98,6 +98,8 @@ pub(super) struct Reached {
     pub placed: Vec<(Range<usize>, InForce)>,
     /// Names that are used otherwise than by motions.
     pub mentioned: BTreeMap<String, InForce>,
+    /// What was taken for granted of other files, at the bytes of the file that is corrected.
+    pub assumed: Vec<(usize, String)>,
 }
 
 impl Reached {
@@ -134,7 +136,8 @@ pub(super) fn settle(found: &mut Gathered, uses: Vec<Vec<InForce>>, words: &Word
                 notes.push((
                     true,
                     at,
-                    "is moved to in none of the files that were read: its frame and tool are not stated".into(),
+                    "is moved to in none of the files that were read, which would state its frame and tool; --with names others"
+                        .into(),
                 ));
             }
             continue;

@@ -91,6 +91,7 @@ fn in_force(
     let companions = || companions.iter().zip(&others);
     for (companion, tokens) in companions() {
         data.declare(companion.text(Language::Krl), &lines(tokens));
+        data.declare_routines(companion.text(Language::Krl), &lines(tokens));
     }
     data.declare(source, own);
     reached::reach(source, own, &data, None, &mut reached);
@@ -99,6 +100,10 @@ fn in_force(
     }
     let uses = reached.uses(&found.literals, names);
     settle(found, uses, &WORDS);
+    let mut called = BTreeSet::new();
+    if found.literals.iter().any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some()) {
+        found.warnings.extend(reached.assumed.into_iter().filter(|(_, message)| called.insert(message.clone())));
+    }
     found.tools = data.tools().collect();
 }
 

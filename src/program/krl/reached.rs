@@ -1,17 +1,19 @@
 //! What is in force where a file of KRL moves to its targets.
 
-use super::super::flow::Flow;
+use super::super::flow::{Flow, Step};
 use super::super::force::{InForce, Reached};
 use super::super::token::{ProgramText, Token, TokenKind};
 use super::MOTIONS;
 use super::line::{declared, opens};
-use super::steps::steps;
+use super::steps::{step, steps};
 use super::system::{SystemData, SystemState};
 
 /// Adds the motions of a file; `file`: how people find it, where it is not the one that is corrected.
 pub(super) fn reach(source: ProgramText, lines: &[&[Token]], data: &SystemData, file: Option<&str>, out: &mut Reached) {
     let places = places(source.bytes, lines, file);
-    let flow = Flow::of(&steps(source, lines, |line| SystemData::sets(source, line)));
+    let own: Vec<String> =
+        lines.iter().filter_map(|line| if let Step::Routine(name) = step(source, line) { Some(name) } else { None }).collect();
+    let flow = Flow::of(&steps(source, lines, |line| data.sets(source, line)));
     let states = match &flow {
         Ok(flow) => flow.states(&SystemState::START, |at, state| data.take(source, lines[at], &places[at], state)),
         Err(_) => vec![None; lines.len()],
@@ -23,6 +25,12 @@ pub(super) fn reach(source: ProgramText, lines: &[&[Token]], data: &SystemData, 
     for ((line, state), place) in lines.iter().zip(states).zip(&places) {
         if !is_motion(source, line) {
             mentions(source, line, place, out);
+            if let Some(name) = data.unknown_call(source, line).filter(|name| !own.contains(name) && file.is_none()) {
+                let message = format!(
+                    "calls {name} of a file that was not read: calib assumed that it leaves $BASE, $TOOL and $LOAD as they are"
+                );
+                out.assumed.push((line[0].span.start, message));
+            }
             continue;
         }
         let force = match &state {

@@ -25,7 +25,7 @@ fn is_declared(source: ProgramText, line: &[Token]) -> bool {
     source.is_word(&line[0], &["EXT", "EXTFCT", "EXTP", "EXTFCTP", "INTERRUPT", "GLOBAL", "TRIGGER"])
 }
 
-fn step(source: ProgramText, line: &[Token]) -> Step {
+pub(super) fn step(source: ProgramText, line: &[Token]) -> Step {
     let word = source.upper(&line[0]);
     let second = line.get(1).map(|token| source.upper(token)).unwrap_or_default();
     if let Some(at) = line.iter().take(3).position(|token| source.is_word(token, &ROUTINES)) {

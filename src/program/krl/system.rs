@@ -4,10 +4,12 @@
 //! numbers, by `BAS(#BASE, n)` and `BAS(#TOOL, n)` (which takes the load of the same number), and by the data of a point (`FDAT`) that an inline
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
 
+use super::super::flow::{Joined, Step};
 use super::super::force::{InForce, Setting, ToolInForce};
 use super::super::token::{ProgramText, Token, TokenKind};
 use super::aggregate::Aggregate;
 use super::line::{closing, declared, member, opens};
+use super::steps::step;
 use crate::compensate::turns;
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -33,6 +35,8 @@ pub(super) struct SystemData {
     loads: BTreeMap<i64, Option<f64>>,
     points: BTreeMap<String, Option<PointData>>,
     frames: BTreeMap<String, Option<Pose>>,
+    /// Routines of other files, and whether they set what is in force.
+    routines: BTreeMap<String, bool>,
 }
 
 /// The state of a program: what is in force, and the point whose data come next.
@@ -44,7 +48,7 @@ pub(super) struct SystemState {
     astray: Setting<String>,
 }
 
-impl super::super::flow::Joined for SystemState {
+impl Joined for SystemState {
     fn joined(&self, other: &Self) -> Self {
         let point = self.point.clone().filter(|point| other.point.as_ref() == Some(point));
         Self { force: self.force.joined(&other.force), point, astray: self.astray.joined(&other.astray) }
@@ -109,16 +113,51 @@ impl SystemData {
         }
     }
 
+    /// Adds the routines of another file.
+    pub fn declare_routines(&mut self, source: ProgramText, lines: &[&[Token]]) {
+        let mut inside: Option<String> = None;
+        for line in lines {
+            match step(source, line) {
+                Step::Routine(name) => {
+                    self.routines.insert(name.clone(), false);
+                    inside = Some(name);
+                }
+                _ if self.sets(source, line) => {
+                    inside.iter().for_each(|name| {
+                        self.routines.insert(name.clone(), true);
+                    });
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// Whether a line sets what is in force.
-    pub fn sets(source: ProgramText, line: &[Token]) -> bool {
+    pub fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
         const SET: [&str; 7] = ["$BASE", "$TOOL", "$LOAD", "$IPO_MODE", "$ROBROOT", "FDAT_ACT", "BAS"];
-        source.is_word(&line[0], &SET)
+        source.is_word(&line[0], &SET) || self.called(source, line) == Some(true)
+    }
+
+    /// Whether a line calls a routine of another file, and that one sets what is in force.
+    fn called(&self, source: ProgramText, line: &[Token]) -> Option<bool> {
+        let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
+        self.routines.get(&source.upper(&line[0])).copied().filter(|_| call)
+    }
+
+    /// The routine that a line calls and that no file that was read has.
+    pub fn unknown_call(&self, source: ProgramText, line: &[Token]) -> Option<String> {
+        let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
+        let known = source.is_word(&line[0], &["BAS"]) || self.routines.contains_key(&source.upper(&line[0]));
+        (call && !known).then(|| source.upper(&line[0]))
     }
 
     /// Takes a state through a line; `place`: how people find it.
     pub fn take(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
         if source.is_word(&line[0], &["BAS"]) {
             self.call(source, line, place, state);
+        } else if self.called(source, line) == Some(true) {
+            let name = source.upper(&line[0]);
+            state.force = InForce::open(&format!("is set by {name}, a routine of another file ({place})"));
         } else {
             self.set(source, line, place, state);
         }

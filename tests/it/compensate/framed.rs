@@ -4,6 +4,7 @@
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};
 use super::sides::{confdata, krl, poses, rapid, status, turn};
+use super::{calib, cell};
 use calib::compensate::turns;
 use calib::program::{Companion, Language, RobotTool};
 use calib::spatial::Pose;
@@ -180,6 +181,44 @@ fn every_target_stands_in_its_frame_and_is_reached_with_its_tool() {
             assert!(apart < 1e-3, "{} {name}: {apart} mm", maker.name);
         }
     }
+}
+
+#[test]
+fn files_beside_a_program_are_read_with_it_in_capitals_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    std::fs::create_dir_all(here.join("R1/Program"))
+        .and_then(|()| std::fs::create_dir_all(here.join("R1/System")))
+        .expect("folders");
+    let at = |name: &str| here.join("R1").join(name);
+    let write = |name: &str, text: &str| std::fs::write(at(name), text).expect("a file");
+    write("System/$CONFIG.DAT", "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n");
+    write("Program/WELD.SRC", "DEF WELD()\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,100)\nPTP XP1\nEND\n");
+    write(
+        "Program/Weld.dat",
+        "DEFDAT WELD\nDECL E6POS XP1={X 600,Y 0,Z 430,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\nENDDAT\n",
+    );
+    let program = at("Program/Weld.dat").display().to_string();
+    let run = |more: &[&str]| {
+        let output = calib(cell(), &[&["compensate", "latest", program.as_str()], more].concat(), "");
+        let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        (output.status.code(), out, err)
+    };
+    let (code, _, err) = run(&[]);
+    assert_eq!(code, Some(0), "{err}");
+    assert!(err.contains("read with the program: ") && err.contains("WELD.SRC") && err.contains("$CONFIG.DAT"), "{err}");
+    assert!(err.contains("BASE_DATA[3] by FP1 at") && err.contains("is applied, in the robot's base"), "{err}");
+    assert!(err.contains("the tool TOOL_DATA[2] is taken as the robot file's"), "{err}");
+    std::fs::remove_file(at("System/$CONFIG.DAT")).expect("removed");
+    let (code, out, err) = run(&[]);
+    assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
+    assert!(err.contains("Weld.dat:2:") && err.contains("BASE_DATA[3], which no file that was read declares"), "{err}");
+    write("frames.dat", "BASE_DATA[3]={X 300,Y 40,Z 500,A 0,B 0,C 0}\nTOOL_DATA[2]={X 40,Y 30,Z 130,A 0,B 0,C 0}\n");
+    let (code, _, err) = run(&["--with", &at("frames.dat").display().to_string()]);
+    assert_eq!(code, Some(0), "{err}");
+    let (code, _, err) = run(&["--tool", "1,2"]);
+    assert_eq!(code, Some(2), "{err}");
+    assert!(err.contains("--tool: expected the name of a tool"), "{err}");
 }
 
 #[test]

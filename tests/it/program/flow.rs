@@ -27,7 +27,8 @@ fn followed(text: &str) -> (Vec<f64>, Vec<String>) {
 
 fn is_refused(text: &str, why: &str) {
     let (_, frames) = followed(text);
-    assert!(frames.len() == 1 && frames[0].contains(why), "{text}\n{frames:?}, expected {why}");
+    assert!(!frames.is_empty() && frames[0].contains(why), "{text}\n{frames:?}, expected {why}");
+    assert!(frames.iter().all(|frame| frame.starts_with(&frames[0][..3])), "one target alone: {frames:?}");
 }
 
 #[test]
@@ -119,6 +120,19 @@ fn points_of_inline_forms_are_followed_through_the_files_of_a_program() {
     let fixed = data.replace("#BASE", "#TCP");
     let (_, frames) = read(&fixed, &[("A.SRC", source), ("$CONFIG.DAT", system)]);
     assert!(frames[0].contains("the tool stands still"), "{frames:?}");
+}
+
+#[test]
+fn routines_of_other_files_leave_frames_as_they_are_or_are_read() {
+    let one = base(100.0);
+    let text = format!("DEF MAIN()\n{one}\nGRIP(1)\nGRIP(2)\n{MOTION}\nEND\n");
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    let told: Vec<&str> =
+        program.warnings().iter().map(|note| note.message.as_str()).filter(|told| told.contains("GRIP")).collect();
+    assert_eq!(told, ["calls GRIP of a file that was not read: calib assumed that it leaves $BASE, $TOOL and $LOAD as they are"]);
+    assert_eq!(read(&text, &[("grip.src", "DEF GRIP(N:IN)\n$OUT[1]=TRUE\nEND\n")]).1, [""; 0]);
+    let (_, frames) = read(&text, &[("grip.src", "DEF GRIP(N:IN)\n$BASE=$NULLFRAME\nEND\n")]);
+    assert!(frames[0].contains("5: its $BASE is set by GRIP, a routine of another file (line 4)"), "{frames:?}");
 }
 
 #[test]

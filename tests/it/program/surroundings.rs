@@ -107,7 +107,7 @@ fn joints_are_the_same_in_every_frame() {
 
 #[test]
 fn the_targets_of_a_file_are_reached_with_one_tool() {
-    let robot = RobotModel::new(Kind::Sr210d.description([0.0, 0.0, 200.0]));
+    let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
     let said = |tool: &str| {
         let targets = format!("{TOOLS}CONST robtarget p:=[[1,2,3],{REST};\nCONST robtarget r:=[[4,5,6],{REST};\n");
         let text = format!("{targets}MoveL p,v1,z1,gun;\nMoveL r,v1,z1,{tool};");
