@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What a line (or a statement) is for the order of execution; names in capitals.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum FlowStep {
     Plain,
     If,
     ElseIf,
@@ -36,7 +36,7 @@ pub(super) enum Step {
 /// A line: its step, the routines that it calls, whether it sets something.
 #[derive(Debug, Clone)]
 pub(super) struct FlowLine {
-    pub step: Step,
+    pub step: FlowStep,
     pub calls: Vec<String>,
     pub sets: bool,
 }
@@ -49,13 +49,13 @@ pub(super) struct Flow {
 }
 
 /// What two ways know, joined.
-pub(super) trait Joined: Clone + PartialEq {
+pub(super) trait JoinedState: Clone + PartialEq {
     fn joined(&self, other: &Self) -> Self;
 }
 
 struct Block {
     head: usize,
-    begun: Step,
+    begun: FlowStep,
     /// Lines from which its end is reached.
     ends: Vec<usize>,
     /// Whether one of its ways is taken in any case.
@@ -98,7 +98,7 @@ impl Flow {
     }
 
     /// What is known before each line runs, none where it is never reached; `step` takes it through a line.
-    pub fn states<S: Joined>(&self, start: &S, step: impl Fn(usize, &mut S)) -> Vec<Option<S>> {
+    pub fn states<S: JoinedState>(&self, start: &S, step: impl Fn(usize, &mut S)) -> Vec<Option<S>> {
         let mut states: Vec<Option<S>> = vec![None; self.next.len()];
         let mut waiting: BTreeSet<usize> = BTreeSet::new();
         for entry in &self.entries {
@@ -128,25 +128,26 @@ impl Builder {
     }
 
     /// Adds a line; none where it fits no block.
-    fn line(&mut self, at: usize, step: &Step) -> Option<()> {
+    fn line(&mut self, at: usize, step: &FlowStep) -> Option<()> {
         match step {
-            Step::Else | Step::ElseIf | Step::Case | Step::Default => return self.other_way(at, step),
-            Step::Routine(name) => {
+            FlowStep::Else | FlowStep::ElseIf | FlowStep::Case | FlowStep::Default => return self.other_way(at, step),
+            FlowStep::Routine(name) => {
                 let sound = self.blocks.is_empty() && self.inside.is_none();
                 self.inside = Some((name.clone(), at));
                 self.open = vec![at];
                 return sound.then_some(());
             }
-            Step::EndRoutine => {
+            FlowStep::EndRoutine => {
                 let from = [std::mem::take(&mut self.open), std::mem::take(&mut self.returns)].concat();
                 self.link(&from, at);
                 let (name, first) = self.inside.take()?;
                 self.routines.insert(name, (first, at));
                 return self.blocks.is_empty().then_some(());
             }
-            Step::EndIf | Step::EndSwitch => {
+            FlowStep::EndIf | FlowStep::EndSwitch => {
                 let block = self.blocks.pop()?;
-                let fits = matches!((step, &block.begun), (Step::EndIf, Step::If) | (Step::EndSwitch, Step::Switch));
+                let fits =
+                    matches!((step, &block.begun), (FlowStep::EndIf, FlowStep::If) | (FlowStep::EndSwitch, FlowStep::Switch));
                 self.open.extend(block.ends);
                 self.open.extend((!block.whole).then_some(block.head));
                 let from = std::mem::take(&mut self.open);
@@ -159,33 +160,33 @@ impl Builder {
         let from = std::mem::replace(&mut self.open, vec![at]);
         self.link(&from, at);
         match step {
-            Step::If | Step::While | Step::Loop | Step::Switch => {
+            FlowStep::If | FlowStep::While | FlowStep::Loop | FlowStep::Switch => {
                 self.blocks.push(Block { head: at, begun: step.clone(), ends: Vec::new(), whole: false });
-                if *step == Step::Switch {
+                if *step == FlowStep::Switch {
                     self.open.clear();
                 }
             }
-            Step::EndLoop | Step::EndForever => {
+            FlowStep::EndLoop | FlowStep::EndForever => {
                 let block = self.blocks.pop()?;
                 self.next[at].push(block.head);
-                if *step == Step::EndForever {
+                if *step == FlowStep::EndForever {
                     self.open.clear();
                 }
-                self.open.extend((block.begun == Step::While).then_some(block.head));
+                self.open.extend((block.begun == FlowStep::While).then_some(block.head));
                 self.open.extend(block.ends);
-                return matches!(block.begun, Step::While | Step::Loop).then_some(());
+                return matches!(block.begun, FlowStep::While | FlowStep::Loop).then_some(());
             }
-            Step::Exit => {
-                let of_loop = |block: &&mut Block| matches!(block.begun, Step::While | Step::Loop);
+            FlowStep::Exit => {
+                let of_loop = |block: &&mut Block| matches!(block.begun, FlowStep::While | FlowStep::Loop);
                 self.blocks.iter_mut().rev().find(of_loop)?.ends.push(at);
                 self.open.clear();
             }
-            Step::Goto(label) => {
+            FlowStep::Goto(label) => {
                 self.jumps.push((at, label.clone()));
                 self.open.clear();
             }
-            Step::Label(label) => drop(self.labels.insert(label.clone(), at)),
-            Step::Return => {
+            FlowStep::Label(label) => drop(self.labels.insert(label.clone(), at)),
+            FlowStep::Return => {
                 self.returns.push(at);
                 self.open.clear();
             }
@@ -195,14 +196,16 @@ impl Builder {
     }
 
     /// `ELSE`, `CASE` and the like: the way before ends, and another one begins at the head of the block.
-    fn other_way(&mut self, at: usize, step: &Step) -> Option<()> {
+    fn other_way(&mut self, at: usize, step: &FlowStep) -> Option<()> {
         let block = self.blocks.last_mut()?;
-        let fits =
-            matches!((step, &block.begun), (Step::Else | Step::ElseIf, Step::If) | (Step::Case | Step::Default, Step::Switch));
+        let fits = matches!(
+            (step, &block.begun),
+            (FlowStep::Else | FlowStep::ElseIf, FlowStep::If) | (FlowStep::Case | FlowStep::Default, FlowStep::Switch)
+        );
         block.ends.append(&mut self.open);
-        block.whole |= matches!(step, Step::Else | Step::Default);
+        block.whole |= matches!(step, FlowStep::Else | FlowStep::Default);
         self.next[block.head].push(at);
-        if *step == Step::ElseIf {
+        if *step == FlowStep::ElseIf {
             block.head = at;
         }
         self.open = vec![at];
@@ -237,7 +240,7 @@ impl Builder {
         let own = self.routines.values().map(|(first, _)| *first).min();
         let routines = self.routines.iter().filter(|(name, (first, _))| !called.contains(name) || Some(*first) == own);
         let mut entries: Vec<usize> = routines.map(|(_, (first, _))| *first).collect();
-        if !lines.is_empty() && !matches!(lines[0].step, Step::Routine(_)) {
+        if !lines.is_empty() && !matches!(lines[0].step, FlowStep::Routine(_)) {
             entries.push(0);
         }
         Flow { next: self.next, entries }

@@ -14,6 +14,7 @@ mod literal;
 pub mod mark;
 mod pose;
 mod rapid;
+mod settle;
 mod stated;
 mod token;
 mod tools;

@@ -75,6 +75,12 @@ pub(super) fn relate(
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
     let mut one: Option<ToolInForce> = None;
     let mut unset = None;
+    let of_joints: Vec<(usize, ToolInForce)> = found
+        .literals
+        .iter_mut()
+        .filter(|literal| literal.kind == TargetKind::Joints)
+        .filter_map(|literal| Some((literal.at(), literal.tool_in_force.take()?)))
+        .collect();
     for literal in found.literals.iter_mut().filter(|literal| literal.kind != TargetKind::Joints) {
         let at = literal.at();
         let Some(tool) = literal.tool_in_force.take() else {
@@ -98,6 +104,22 @@ pub(super) fn relate(
             }
         }
         one.get_or_insert(tool);
+    }
+    let carried = found.literals.iter().find_map(|literal| Some((literal.at(), literal.tool?.translation.norm())));
+    if let Some((at, far)) = carried {
+        let message = format!(
+            "its tool stands {:.1} mm from the robot file's: the correction there rests on how well orientations are identified",
+            far * 1e3
+        );
+        notes.push((false, at, message));
+    }
+    let is_other = |tool: &ToolInForce| match of_the_file {
+        Some(frame) => tool.frame.is_some_and(|own| own != frame),
+        None => one.as_ref().is_some_and(|one| one != tool),
+    };
+    if let Some((at, tool)) = of_joints.into_iter().find(|(_, tool)| is_other(tool)) {
+        let message = format!("joints with the tool {}: they are corrected where the robot file's tool is", tool.name);
+        notes.push((false, at, message));
     }
     let frame = of_the_file.or_else(|| one.as_ref().and_then(|tool| tool.frame));
     if let Some(apart) = frame.and_then(|frame| apart(robot, &frame)) {

@@ -12,7 +12,7 @@ mod reached;
 mod steps;
 mod system;
 
-use super::force::{Reached, Words, settle};
+use super::settle::{Reached, Words, settle};
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{Companion, DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};

@@ -1,7 +1,8 @@
 //! What is in force where a file of KRL moves to its targets.
 
-use super::super::flow::{Flow, Step};
-use super::super::force::{InForce, Reached};
+use super::super::flow::{Flow, FlowStep};
+use super::super::force::InForce;
+use super::super::settle::Reached;
 use super::super::token::{ProgramText, Token, TokenKind};
 use super::MOTIONS;
 use super::line::{declared, opens};
@@ -11,8 +12,10 @@ use super::system::{SystemData, SystemState};
 /// Adds the motions of a file; `file`: how people find it, where it is not the one that is corrected.
 pub(super) fn reach(source: ProgramText, lines: &[&[Token]], data: &SystemData, file: Option<&str>, out: &mut Reached) {
     let places = places(source.bytes, lines, file);
-    let own: Vec<String> =
-        lines.iter().filter_map(|line| if let Step::Routine(name) = step(source, line) { Some(name) } else { None }).collect();
+    let own: Vec<String> = lines
+        .iter()
+        .filter_map(|line| if let FlowStep::Routine(name) = step(source, line) { Some(name) } else { None })
+        .collect();
     let flow = Flow::of(&steps(source, lines, |line| data.sets(source, line)));
     let states = match &flow {
         Ok(flow) => flow.states(&SystemState::START, |at, state| data.take(source, lines[at], &places[at], state)),

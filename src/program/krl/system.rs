@@ -4,7 +4,7 @@
 //! numbers, by `BAS(#BASE, n)` and `BAS(#TOOL, n)` (which takes the load of the same number), and by the data of a point (`FDAT`) that an inline
 //! form names: `FDAT_ACT=FP1` with `BAS(#PTP_PARAMS, ..)`, or `WITH $BASE=SBASE(FP1.BASE_NO), $TOOL=STOOL2(FP1)` for one motion.
 
-use super::super::flow::{Joined, Step};
+use super::super::flow::{FlowStep, JoinedState};
 use super::super::force::{InForce, Setting, ToolInForce};
 use super::super::token::{ProgramText, Token, TokenKind};
 use super::aggregate::Aggregate;
@@ -48,7 +48,7 @@ pub(super) struct SystemState {
     astray: Setting<String>,
 }
 
-impl Joined for SystemState {
+impl JoinedState for SystemState {
     fn joined(&self, other: &Self) -> Self {
         let point = self.point.clone().filter(|point| other.point.as_ref() == Some(point));
         Self { force: self.force.joined(&other.force), point, astray: self.astray.joined(&other.astray) }
@@ -118,7 +118,7 @@ impl SystemData {
         let mut inside: Option<String> = None;
         for line in lines {
             match step(source, line) {
-                Step::Routine(name) => {
+                FlowStep::Routine(name) => {
                     self.routines.insert(name.clone(), false);
                     inside = Some(name);
                 }

@@ -1,6 +1,7 @@
 //! What is in force where the files of a program in RAPID move to its targets.
 
-use super::super::force::{InForce, Reached, Words, settle};
+use super::super::force::InForce;
+use super::super::settle::{Reached, Words, settle};
 use super::super::token::{ProgramText, Token, TokenKind, tokens};
 use super::super::{Companion, Gathered, Language};
 use super::arguments::arguments;

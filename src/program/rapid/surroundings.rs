@@ -5,8 +5,9 @@
 //! reference manual RAPID). A work object is applied where it stands still and the program alone says where; the world frame is taken as
 //! the robot's base.
 
-use super::super::force::{InForce, Reached, Setting, ToolInForce};
+use super::super::force::{InForce, Setting, ToolInForce};
 use super::super::quoted;
+use super::super::settle::Reached;
 use super::super::token::{ProgramText, Token, TokenKind};
 use super::list::List;
 use super::{Declaration, declaration};

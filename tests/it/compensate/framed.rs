@@ -246,7 +246,16 @@ fn tools_are_related_where_the_program_says_how_and_refused_where_it_does_not() 
     let two = text(&["BAS(#TOOL,1)", "BAS(#TOOL,2)"]);
     let refused = run(&two, None).expect_err("two tools");
     assert!(refused.contains("program:6:") && refused.contains("--tool says which of them is the robot file's"), "{refused}");
-    let by_number = run(&two, Some("1")).expect("corrected").bytes;
+    let by_number = run(&two, Some("1")).expect("corrected");
+    let far = |note: &calib::program::Note| note.line == 6 && note.message.contains("its tool stands 172.9 mm");
+    assert!(by_number.warnings.iter().any(far), "{:?}", by_number.warnings);
+    let by_number = by_number.bytes;
+    let joints = two.replace("END\n", "BAS(#TOOL,2)\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nEND\n");
+    let joints = run(&joints, Some("1")).expect("corrected").warnings;
+    assert!(
+        joints.iter().any(|note| note.message.contains("joints with the tool TOOL_DATA[2]: they are corrected")),
+        "{joints:?}"
+    );
     let by_frame = numbers(&own_tool(&trip)).map(|number| format!("{number:.9}")).join(",");
     assert_eq!(run(&two, Some(&by_frame)).expect("corrected").bytes, by_number);
     let refused = run(&two, Some("7")).expect_err("no such tool");
