@@ -5,7 +5,8 @@
 //! taught at an absolutely accurate robot. Turn T: bit i where joint i + 1 is below 0 (KUKA System Software, Operating and Programming
 //! Instructions for System Integrators, "Status and Turn"). RAPID: cf1, cf4, cf6 are the quadrants of joints 1, 4, 6; cfx counts by 4 where
 //! the wrist centre is behind axis 1, by 2 where it is behind the lower arm, by 1 where joint 5 is below 0 (ABB, Technical reference manual
-//! RAPID, "confdata"). An arm with a parallelogram, whose joint 3 is counted with joint 2, does not use cfx.
+//! RAPID, "confdata"). An arm with a parallelogram, whose joint 3 is counted with joint 2, does not use cfx. KUKA's controllers read S and T of
+//! PTP motions and go on in the posture of before along lines and circles; what was taught there states it all the same.
 
 use super::JOINTS;
 use crate::compensate::{ArmSides, StatedPosture, StatedSides};

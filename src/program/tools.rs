@@ -49,6 +49,9 @@ impl RobotTool {
             Self::Named(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => format!("TOOL_DATA[{name}]"),
             Self::Named(name) => name.to_ascii_uppercase(),
         };
+        if ["TOOL0", "TOOL_DATA[0]"].contains(&name.as_str()) {
+            return Ok(Pose::identity());
+        }
         let known: Vec<(&str, &Pose)> =
             known.iter().filter_map(|tool| Some((tool.name.as_str(), tool.frame.as_ref()?))).collect();
         let found = known.iter().find(|(own, _)| *own == name).map(|(_, frame)| **frame);
@@ -151,5 +154,6 @@ fn apart(robot: &RobotModel, frame: &Pose) -> Option<String> {
             own * 1e3
         )
     };
-    (!((stated - own).abs() <= SAME)).then(message)
+    let far = (stated - own).abs();
+    (far > SAME || far.is_nan()).then(message)
 }

@@ -72,7 +72,9 @@ fn operands<'t>(source: ProgramText, line: &'t [Token]) -> impl Iterator<Item = 
 
 /// Names that a line uses otherwise than as the position of a motion: where what they hold goes is not followed.
 fn mentions(source: ProgramText, line: &[Token], place: &str, out: &mut Reached) {
-    if declared(source, line).is_some() || source.upper(&line[0]).ends_with("_REL") {
+    let head = source.upper(&line[0]);
+    // Variables of the system are no targets that a program moves to by their names.
+    if declared(source, line).is_some() || head.ends_with("_REL") || head.starts_with('$') {
         return;
     }
     // What is assigned to is none that is used.

@@ -147,3 +147,18 @@ fn loads_follow_the_program() {
 fn followed_loads(text: &str) -> Vec<Option<f64>> {
     read(text, &[]).0.iter().map(|literal| literal.payload).collect()
 }
+
+#[test]
+fn a_program_as_teach_pendants_write_it_is_followed() {
+    let source = "&ACCESS RVP\n&REL 12\nDEF  weld( )\n;FOLD INI\n;FOLD BASISTECH INI\nGLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )\nINTERRUPT ON 3\nBAS (#INITMOV,0 )\n;ENDFOLD\n;ENDFOLD\n;FOLD PTP HOME  Vel= 100 % DEFAULT\n$BWDSTART = FALSE\nPDAT_ACT=PDEFAULT\nFDAT_ACT=FHOME\nBAS (#PTP_PARAMS,100 )\n$H_POS=XHOME\nPTP  XHOME\n;ENDFOLD\nLOOP\nIF $IN[17] THEN\n;FOLD LIN P1 Vel=2 m/s CPDAT1 Tool[1] Base[2]\n$BWDSTART=FALSE\nLDAT_ACT=LCPDAT1\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2)\nLIN XP1 C_DIS\n;ENDFOLD\nELSE\nFDAT_ACT=FP2\nBAS(#CP_PARAMS,2)\nCIRC XP2, XP3\nENDIF\nENDLOOP\nEND\n";
+    let pose = "{X 1,Y 2,Z 3,A 4,B 5,C 6,S 6,T 27,E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}";
+    let data = format!(
+        "&ACCESS RVP\nDEFDAT  WELD\n;FOLD EXTERNAL DECLARATIONS\nEXT  BAS (BAS_COMMAND  :IN,REAL  :IN )\nDECL INT SUCCESS\n;ENDFOLD\nDECL E6POS XP1={pose}\nDECL FDAT FP1={{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE FALSE}}\nDECL LDAT LCPDAT1={{VEL 2.0,ACC 100.0,APO_DIST 100.0,APO_FAC 50.0,ORI_TYP #VAR}}\nDECL E6POS XP2={pose}\nDECL E6POS XP3={pose}\nDECL FDAT FP2={{TOOL_NO 1,BASE_NO 3,IPO_FRAME #BASE,POINT2[] \"XP2\",TQ_STATE FALSE}}\nENDDAT\n"
+    );
+    let system = "DEFDAT  $CONFIG\nE6AXIS XHOME={A1 0.0,A2 -90.0,A3 90.0,A4 0.0,A5 0.0,A6 0.0}\nDECL FDAT FHOME={TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE,POINT2[] \" \"}\nFRAME BASE_DATA[32]\nBASE_DATA[2]={X 100,Y 0,Z 0,A 0,B 0,C 0}\nBASE_DATA[3]={X 200,Y 0,Z 0,A 0,B 0,C 0}\nTOOL_DATA[1]={X 0,Y 0,Z 210,A 0,B 0,C 0}\nLOAD_DATA[1]={M 62,CM {X 0,Y 0,Z 90,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nENDDAT\n";
+    let (literals, frames) = read(&data, &[("weld.src", source), ("$config.dat", system)]);
+    assert_eq!(frames, [""; 0]);
+    let x = |literal: &Literal| literal.frame.map_or(0.0, |frame| (frame.translation.x * 1e3).round());
+    assert_eq!(literals.iter().map(x).collect::<Vec<_>>(), [100.0, 200.0, 200.0]);
+    assert!(literals.iter().all(|literal| literal.payload == Some(62.0)));
+}
