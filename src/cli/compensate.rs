@@ -1,12 +1,13 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
+use super::companions::Companions;
 use super::feed_forward::{FeedForward, feed_forward};
 use super::model_arguments::ModelArguments;
 use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
-use crate::program::{self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, mark};
+use crate::program::{self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, RobotTool, mark};
 use crate::raw;
 use crate::robot::{JointConvention, Measurements};
 use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
@@ -27,12 +28,15 @@ use std::path::{Path, PathBuf};
 /// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
 /// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
-/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, or in the
-/// work object or $BASE that the program itself declares, in the posture that they state: the quadrants cf1, cf4, cf6 of RAPID, the signs T of KRL, in the controller's counting; cfx and S are not
-/// checked. Of what that leaves open, and where nothing is stated, the posture nearest to the target before (or --start) is taken. A target
-/// that cannot be reached in its posture is refused. Programs that set another $BASE or $TOOL, name another work object or displace
-/// their targets are refused (--assume-frames), and so are programs and tables without a payload where the model depends on load: of RAPID it is
-/// the mass of the motion's tool (tooldata, or \TLoad), of KRL that of $LOAD, where the program declares it once; --payload overrules it.
+/// RAPID (.mod: jointtarget, robtarget). A Cartesian target is reached in the posture that it states, in the controller's counting: S and T of
+/// KRL, confdata of RAPID with cfx; of what that leaves open, and where nothing is stated, the posture nearest to the target before (or
+/// --start) is taken. One that cannot be reached in its posture is refused; where a correction takes a joint over a border, S, T and confdata
+/// are written anew. It stands in the work object or $BASE that is in force on every way to it, and is reached with the tool in force: lines
+/// are followed through branches, loops and calls, by what the file declares, the file of the same name beside it (.src, .dat), $config.dat
+/// and the files of --with. The tool is taken as the robot file's where the program has one, and --tool says which it is where it has several.
+/// What is not known so, is computed when the program runs, or moves (conveyors, tools that stand still) is refused (--assume-frames), and so
+/// are programs and tables without a payload where the model depends on load: of RAPID it is the mass of the motion's tool (tooldata, or
+/// \\TLoad), of KRL that of $LOAD in force; --payload overrules it. Routines of files that were not read are taken to set nothing.
 /// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
 /// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
 /// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program
@@ -88,6 +92,13 @@ pub(super) struct CompensateArguments {
     /// for each, instead of refusing the program
     #[arg(long)]
     assume_frames: bool,
+    /// Which tool of a program is the robot file's: its name, its number in TOOL_DATA, or its frame X,Y,Z,A,B,C at the flange, mm and deg
+    /// [default: the one that the program uses]
+    #[arg(long, value_name = "TOOL", allow_hyphen_values = true)]
+    tool: Option<String>,
+    /// Further files of a program, which declare frames, tools and loads or move to its targets (may be repeated)
+    #[arg(long, value_name = "FILE")]
+    with: Vec<PathBuf>,
     /// Temperature where the targets do not say, C [default: that at the start of the recording]
     #[arg(long, value_name = "C", allow_hyphen_values = true)]
     temperature: Option<f64>,
@@ -109,7 +120,7 @@ pub(super) struct CompensateArguments {
     length: Option<String>,
     /// Torques that a planned motion needs, instead of corrected targets
     #[arg(long, conflicts_with_all = ["target", "orientation", "one_step", "plain", "leave_partial", "payload", "max_correction", "max_turn",
-          "max_uncertainty", "assume_frames", "temperature", "time", "direction", "start", "angle", "length", "no_sigma"])]
+          "max_uncertainty", "assume_frames", "tool", "with", "temperature", "time", "direction", "start", "angle", "length", "no_sigma"])]
     torque: bool,
     /// Seconds from when the arm began to move to the first row, for friction that falls as gears warm up [default: the arm is warm]
     #[arg(long, value_name = "S", requires = "torque")]
@@ -211,6 +222,8 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
     if let Some(direction) = arguments.direction.filter(|direction| direction.abs() != 1.0) {
         faults.push(Fault::new("--direction", format!("expected 1 or -1, found {direction}")));
     }
+    let tool = arguments.tool.as_deref().and_then(|tool| RobotTool::parse(tool).err());
+    faults.extend(tool.map(|message| Fault::new("--tool", message)));
     if arguments.targets.as_os_str() != "-" {
         faults.extend(open(&arguments.targets).err());
     }
@@ -318,7 +331,8 @@ fn rewritten(
 ) -> Result<()> {
     let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
-    let source = ProgramFile { place: layout.place, text: &text, language };
+    let companions = Companions::of(&arguments.targets, language, &arguments.with)?;
+    let source = ProgramFile { place: layout.place, text: &text, language, companions: &companions.files() };
     if mark::stands_in(&text, language) && !arguments.model.force {
         let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
         return Err(Error::data(layout.place, message));
@@ -329,7 +343,10 @@ fn rewritten(
         (None, Some(most)) => ProgramLoad::Needed(most),
         (None, None) => ProgramLoad::Optional,
     };
-    let mut rewritten = program::corrected(&source, ProgramRules { partial, frames, load }, layout.robot, corrector)?;
+    let tool = arguments.tool.as_deref().and_then(|tool| RobotTool::parse(tool).ok());
+    let told = companions.told().filter(|_| !arguments.model.quiet).unwrap_or_default();
+    let _ = std::io::stderr().write_all(told.as_bytes());
+    let mut rewritten = program::corrected(&source, ProgramRules { partial, frames, load, tool }, layout.robot, corrector)?;
     rewritten.bytes = mark::written(&rewritten.bytes, &text, language, remarks);
     let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());

@@ -1,6 +1,7 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
 mod check;
+mod companions;
 mod compensate;
 mod diagnose;
 mod diff;

@@ -1,7 +1,7 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
-use super::literal::JOINTS;
-use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
+use super::JOINTS;
+use super::{Companion, Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, RobotTool, TargetKind, solve};
 use crate::compensate::Corrector;
 use crate::compensate::unstated_payload;
 use crate::description::RobotDescription;
@@ -19,6 +19,8 @@ pub struct ProgramFile<'a> {
     pub text: &'a [u8],
     /// By the ending of the file.
     pub language: Language,
+    /// Its other files.
+    pub companions: &'a [Companion<'a>],
 }
 
 impl ProgramFile<'_> {
@@ -52,7 +54,7 @@ pub enum ProgramLoad {
 }
 
 /// How a program is taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ProgramRules {
     /// Targets that state some of their numbers.
     pub partial: Partial,
@@ -60,6 +62,8 @@ pub struct ProgramRules {
     pub frames: Frames,
     /// What is carried.
     pub load: ProgramLoad,
+    /// Which tool of the program is the robot file's, where a person says.
+    pub tool: Option<RobotTool>,
 }
 
 /// The program with its targets corrected; fails with every fault of it.
@@ -69,16 +73,18 @@ pub fn corrected(
     robot: &RobotDescription,
     corrector: &mut Corrector,
 ) -> Result<Rewritten> {
-    let ProgramRules { partial, frames, load } = rules;
+    let ProgramRules { partial, frames, load, tool } = rules;
     let robot = RobotModel::new(robot.clone());
     if robot.joints() != JOINTS {
         let message = format!("programs have targets of {JOINTS} joints, the robot has {}", robot.joints());
         return Err(Error::spec(source.place, message));
     }
-    let mut program = Program::parse(source.text, source.language, partial).map_err(|refusal| source.refused(refusal))?;
+    let mut program = Program::parse_with(source.text, source.language, partial, source.companions)
+        .map_err(|refusal| source.refused(refusal))?;
     if program.literals().is_empty() {
         return Err(Error::data(source.place, "has no targets"));
     }
+    program.relate_tools(&robot, tool.as_ref()).map_err(|message| Error::spec(source.place, message))?;
     // Joint targets are the same in every frame.
     let cartesian = program.literals().iter().any(|literal| literal.kind != TargetKind::Joints);
     if frames == Frames::Refused && cartesian && !program.frames().is_empty() {

@@ -1,11 +1,11 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 
+use super::SolvedLiteral;
+use super::force::ToolInForce;
+use super::stated::{self, PostureStatement};
 use crate::robot::Bound;
 use crate::spatial::Pose;
 use std::ops::Range;
-
-/// Joints that both languages have targets for.
-pub(super) const JOINTS: usize = 6;
 
 /// What the numbers of a target mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,18 +16,6 @@ pub enum TargetKind {
     Frame,
     /// x, y, z (mm), q1..q4 (w, x, y, z).
     Quaternion,
-}
-
-/// What a Cartesian target says of the posture in which it is to be reached.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum PostureStatement {
-    /// Nothing.
-    #[default]
-    Unstated,
-    /// RAPID: the quadrants of joints 1, 4 and 6.
-    Quadrants([i32; 3]),
-    /// KRL, T: bit i is set where joint i + 1 is below 0.
-    Turn(u32),
 }
 
 /// A target of a program.
@@ -43,8 +31,14 @@ pub struct Literal {
     pub external: Vec<Option<f64>>,
     /// In which posture.
     pub posture: PostureStatement,
+    /// Where each number of the posture stands.
+    pub posture_spans: Vec<Range<usize>>,
     /// The frame that a Cartesian target stands in, in the robot's base (m); none: the base itself.
     pub frame: Option<Pose>,
+    /// The tool that reaches a Cartesian target, in the frame of the robot file's tool (m); none: that one itself.
+    pub tool: Option<Pose>,
+    /// As the program has it.
+    pub(super) tool_in_force: Option<ToolInForce>,
     /// The mass at the flange that the program states, kg.
     pub payload: Option<f64>,
 }
@@ -79,8 +73,9 @@ impl Literal {
         }
     }
 
-    /// The numbers that change, as text, in the order of the program.
-    pub(super) fn replacements(&self, values: &[f64]) -> Vec<(Range<usize>, String)> {
+    /// The numbers that change, as text, in the order of the program; `bytes`: the program.
+    pub(super) fn replacements(&self, bytes: &[u8], solved: &SolvedLiteral) -> Vec<(Range<usize>, String)> {
+        let SolvedLiteral { values, posture, .. } = solved;
         assert_eq!(values.len(), self.values.len(), "a number for every number");
         let mut out: Vec<(Range<usize>, String)> = Vec::new();
         for (k, (new, old)) in values.iter().zip(&self.values).enumerate() {
@@ -90,6 +85,9 @@ impl Literal {
                 out.push((self.spans[k].clone(), fixed(*new, decimals)));
             }
         }
+        let numbers = self.posture.numbers().into_iter().zip(posture.numbers()).zip(&self.posture_spans);
+        let changed = numbers.filter(|((old, new), _)| old != new);
+        out.extend(changed.map(|((_, new), span)| (span.clone(), stated::written(&bytes[span.clone()], new))));
         out.sort_by_key(|(span, _)| span.start);
         out
     }

@@ -6,20 +6,30 @@
 //! too ([`joint_list`]).
 
 mod correct;
+mod flow;
+mod force;
 mod krl;
 mod list;
 mod literal;
 pub mod mark;
 mod pose;
 mod rapid;
+mod settle;
+mod stated;
 mod token;
+mod tools;
 
 pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
-pub use literal::{Literal, PostureStatement, TargetKind};
+pub use literal::{Literal, TargetKind};
 pub use pose::solve;
+pub use stated::PostureStatement;
+pub use tools::RobotTool;
 
+use crate::robot::RobotModel;
+use force::ToolInForce;
 use std::ops::Range;
+use token::ProgramText;
 
 /// The languages of controllers that are known here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +51,21 @@ impl Language {
     }
 }
 
+/// Another file of a program: it declares frames, tools and loads, or moves to targets that the corrected file declares.
+#[derive(Debug, Clone, Copy)]
+pub struct Companion<'a> {
+    /// How messages name it.
+    pub place: &'a str,
+    /// As it is in the file.
+    pub text: &'a [u8],
+}
+
+impl<'a> Companion<'a> {
+    fn text(&self, language: Language) -> ProgramText<'a> {
+        ProgramText { bytes: self.text, language }
+    }
+}
+
 /// What becomes of a target that states some of its numbers, as `LIN {X 10}`: the controller keeps the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Partial {
@@ -59,11 +84,11 @@ pub enum Frames {
     Assumed,
 }
 
+/// Joints that both languages have targets for.
+const JOINTS: usize = 6;
+
 /// Brackets in brackets, at most: targets in arrays of three dimensions have six.
 const DEPTH: usize = 16;
-
-/// Said once a program.
-const STATUS: &str = "S is not checked: it needs the arm's geometry; targets are reached in the posture that T states";
 
 /// Something said of a place in a program; line and column count from 1, columns in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -94,6 +119,8 @@ pub struct Program<'p> {
     warnings: Vec<Note>,
     /// Frames that are not applied.
     frames: Vec<Note>,
+    /// Tools that its files declare.
+    tools: Vec<ToolInForce>,
 }
 
 /// The answer to one literal.
@@ -101,6 +128,8 @@ pub struct Program<'p> {
 pub struct SolvedLiteral {
     /// The corrected numbers, in the units and the order of [`Literal::values`].
     pub values: Vec<f64>,
+    /// The posture in which it is reached, stated as [`Literal::posture`] is.
+    pub posture: PostureStatement,
     /// What is to be known of it; empty if nothing.
     pub remark: String,
 }
@@ -122,8 +151,8 @@ struct Gathered {
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
     frames: Vec<(usize, String)>,
-    /// Where a status (S) stands first.
-    status: Option<usize>,
+    /// Tools that its files declare.
+    tools: Vec<ToolInForce>,
 }
 
 /// What a language's reader finds declared under names: one for each literal.
@@ -154,11 +183,21 @@ impl Gathered {
 }
 
 impl<'p> Program<'p> {
-    /// Reads a program whole; fails with every fault of it.
+    /// Reads a program that is one file; fails with every fault of it.
     pub fn parse(bytes: &'p [u8], language: Language, partial: Partial) -> Result<Self, ProgramRefusal> {
+        Self::parse_with(bytes, language, partial, &[])
+    }
+
+    /// Reads a file of a program whole, by what the others declare; fails with every fault of it.
+    pub fn parse_with(
+        bytes: &'p [u8],
+        language: Language,
+        partial: Partial,
+        companions: &[Companion],
+    ) -> Result<Self, ProgramRefusal> {
         let mut found = match language {
-            Language::Krl => krl::read(bytes),
-            Language::Rapid => rapid::read(bytes),
+            Language::Krl => krl::read(bytes, companions),
+            Language::Rapid => rapid::read(bytes, companions),
         };
         let mut refusal = ProgramRefusal::default();
         match partial {
@@ -175,18 +214,33 @@ impl<'p> Program<'p> {
         if !refusal.faults.is_empty() {
             return Err(refusal);
         }
-        found.literals.sort_by_key(|literal| literal.at());
-        found.warnings.extend(found.status.map(|at| (at, STATUS.into())));
+        found.literals.sort_by_key(Literal::at);
         let frames = placed(bytes, found.frames);
         let mut warnings = placed(bytes, found.warnings);
         warnings.extend(frames.iter().cloned());
         warnings.sort_by_key(|note| (note.line, note.column));
-        Ok(Self { bytes, literals: found.literals, warnings, frames })
+        Ok(Self { bytes, literals: found.literals, warnings, frames, tools: found.tools })
     }
 
     /// The targets that are to be corrected.
     pub fn literals(&self) -> &[Literal] {
         &self.literals
+    }
+
+    /// Takes the tools of its targets from the robot file's, which is the one that is stated, or else the one that the program uses; fails where
+    /// the stated one is not known.
+    pub fn relate_tools(&mut self, robot: &RobotModel, stated: Option<&RobotTool>) -> Result<(), String> {
+        let mut found = Gathered { literals: std::mem::take(&mut self.literals), ..Gathered::default() };
+        let related = tools::relate(&mut found, robot, stated, &self.tools);
+        self.literals = found.literals;
+        let frames = placed(self.bytes, found.frames);
+        self.warnings.extend(placed(self.bytes, found.warnings));
+        self.warnings.extend(frames.iter().cloned());
+        self.frames.extend(frames);
+        for notes in [&mut self.warnings, &mut self.frames] {
+            notes.sort_by_key(|note| (note.line, note.column));
+        }
+        related
     }
 
     /// Takes `payload` (kg) as what all targets carry, and says where the program states another one.
@@ -227,7 +281,7 @@ impl<'p> Program<'p> {
                     continue;
                 }
             };
-            for (span, text) in literal.replacements(&solved.values) {
+            for (span, text) in literal.replacements(self.bytes, &solved) {
                 bytes.extend_from_slice(&self.bytes[from..span.start]);
                 // `A1-0.1`: the sign parts the name from the number.
                 if bytes.last().is_some_and(u8::is_ascii_alphanumeric) && !text.starts_with('-') {

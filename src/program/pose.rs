@@ -1,11 +1,11 @@
 //! The numbers of a program as targets of the arm, and commands as numbers of a program.
 //!
-//! Cartesian targets are taken as poses of the robot file's tool in the frame that the program states, else in the robot's base. They stay Cartesian: the pose at which the
+//! Cartesian targets are poses of the tool in force in the frame that the program states, else of the robot file's tool, in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::literal::JOINTS;
+use super::stated::PostureReader;
 use super::{Literal, PostureStatement, SolvedLiteral, TargetKind};
-use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, StatedPosture, turns};
+use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, Remark, turns};
 use crate::robot::{JointConvention, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -13,15 +13,27 @@ use std::f64::consts::PI;
 
 /// Every literal corrected, in their order; an error says why there is no command.
 pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
-    let answers = corrector.batch(literals.iter().map(target).collect());
+    let targets = {
+        let reader = PostureReader { robot, convention: corrector.convention(), sides: corrector.sides() };
+        literals.iter().map(|literal| target(literal, &reader)).collect()
+    };
+    let answers = corrector.batch(targets);
+    let reader = PostureReader { robot, convention: corrector.convention(), sides: corrector.sides() };
     let first = literals.iter().position(is_unstated);
+    let unchecked = |literal: &Literal| reader.unchecked(literal.posture);
+    let first_unchecked = literals.iter().position(|literal| unchecked(literal).is_some());
     let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| match &answer.q {
         Some(q) => {
-            let own = (Some(k) == first).then(|| NEAREST.to_string());
+            let posture = reader.restated(literal.posture, q);
+            let changed = (posture != literal.posture)
+                .then(|| format!("posture {} of the corrected joints, was {}", posture, literal.posture));
+            let nearest = (Some(k) == first).then(|| NEAREST.to_string());
+            let unchecked = unchecked(literal).filter(|_| Some(k) == first_unchecked);
             let known = Some(answer.remark()).filter(|remark| !remark.is_empty());
-            let remark = known.into_iter().chain(own).collect::<Vec<_>>().join("; ");
-            Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), remark })
+            let remark = known.into_iter().chain(changed).chain(nearest).chain(unchecked).collect::<Vec<_>>().join("; ");
+            Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), posture, remark })
         }
+        None if answer.remarks.contains(&Remark::OtherPosture) => Err(format!("{} ({})", answer.remark(), literal.posture)),
         None => Err(answer.remark()),
     };
     literals.iter().zip(&answers).enumerate().map(solved).collect()
@@ -34,27 +46,14 @@ fn is_unstated(literal: &Literal) -> bool {
     literal.kind != TargetKind::Joints && literal.posture == PostureStatement::Unstated
 }
 
-/// The posture that a target states; KRL's S is not read: it needs the arm's geometry.
-fn posture(literal: &Literal) -> Option<StatedPosture> {
-    match literal.posture {
-        PostureStatement::Unstated => None,
-        PostureStatement::Quadrants([one, four, six]) => {
-            Some(StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]))
-        }
-        PostureStatement::Turn(turn) => {
-            let below: Vec<bool> = (0..JOINTS).map(|joint| turn >> joint & 1 == 1).collect();
-            Some(StatedPosture::of_signs(&below))
-        }
-    }
-}
-
-fn target(literal: &Literal) -> CommandTarget {
+fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
     let v = &literal.values;
     let stated = CommandTarget { payload: literal.payload, ..CommandTarget::default() };
     let posed = |rotation: Matrix3<f64>| {
         let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * 1e-3);
+        let pose = pose * literal.tool.unwrap_or_else(Pose::identity).inverse();
         let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
-        CommandTarget { point, rotation, posture: posture(literal), ..stated.clone() }
+        CommandTarget { point, rotation, posture: reader.posture(literal.posture), ..stated.clone() }
     };
     match literal.kind {
         TargetKind::Joints => CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..stated },
@@ -73,6 +72,7 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
     let mut own = q.to_vec();
     convention.to_robot(&mut own);
     let pose = literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
+    let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
     let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];

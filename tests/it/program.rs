@@ -1,12 +1,13 @@
 //! Programs of controllers: what is read as a target, what is refused, and that nothing but numbers of targets changes.
 
+mod flow;
 mod krl;
 mod random;
 mod rapid;
 mod reader;
 mod surroundings;
 
-use calib::program::{Language, Note, Partial, Program, SolvedLiteral, TargetKind};
+use calib::program::{Language, Literal, Note, Partial, PostureStatement, Program, SolvedLiteral, TargetKind};
 
 fn told(notes: &[Note]) -> Vec<String> {
     notes.iter().map(|note| format!("{}:{}: {}", note.line, note.column, note.message)).collect()
@@ -30,9 +31,12 @@ fn refused(language: Language, text: &str) -> Vec<String> {
 
 /// The program with `by` added to every number of every target.
 fn moved(program: &Program, by: f64) -> Vec<u8> {
-    let answer =
-        |values: &Vec<f64>| SolvedLiteral { values: values.iter().map(|value| value + by).collect(), remark: String::new() };
-    let answers = program.literals().iter().map(|literal| Ok(answer(&literal.values))).collect();
+    let answer = |literal: &Literal| SolvedLiteral {
+        values: literal.values.iter().map(|value| value + by).collect(),
+        posture: literal.posture,
+        remark: String::new(),
+    };
+    let answers = program.literals().iter().map(|literal| Ok(answer(literal))).collect();
     program.rewritten(answers).expect("every target has an answer").bytes
 }
 
@@ -61,7 +65,7 @@ fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
 fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let text = "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 7}\n";
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
-    let good = SolvedLiteral { values: vec![1.0; 6], remark: String::new() };
+    let good = SolvedLiteral { values: vec![1.0; 6], posture: PostureStatement::Unstated, remark: String::new() };
     let refusal = program.rewritten(vec![Ok(good), Err("not reached".into())]).expect_err("no answer");
     assert_eq!(told(&refusal.faults), ["2:9: not reached"]);
 }
@@ -95,22 +99,27 @@ fn brackets_without_end_are_a_fault_and_no_overflow() {
 
 #[test]
 fn configurations_and_turns_are_read_as_postures() {
-    use calib::program::PostureStatement;
     let postures = |language: Language, text: &str| -> Vec<PostureStatement> {
         let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
         program.literals().iter().map(|literal| literal.posture).collect()
     };
     let robtarget = |cf: &str| format!("MoveL [[1,2,3],[1,0,0,0],[{cf}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;");
-    assert_eq!(postures(Language::Rapid, &robtarget("1,-2,0,4")), [PostureStatement::Quadrants([1, -2, 0])]);
+    assert_eq!(postures(Language::Rapid, &robtarget("1,-2,0,4")), [PostureStatement::Configuration([1, -2, 0, 4])]);
     assert_eq!(postures(Language::Rapid, &robtarget("9E9,9E9,9E9,9E9")), [PostureStatement::Unstated]);
+    assert_eq!(
+        refused(Language::Rapid, &robtarget("0,0,0,8")),
+        ["1:33: 8 is no configuration cfx, expected a whole number from 0 to 7"]
+    );
     let found = refused(Language::Rapid, &robtarget("0.5,0,0,0"));
     assert_eq!(found, ["1:27: 0.5 is no quadrant of a joint, expected a whole number"]);
+    let of = |status, turn| PostureStatement::StatusTurn { status, turn };
     let pos = |rest: &str| format!("LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6{rest}}}");
     for (text, bits) in [("T 10", 10), ("T 'B101010'", 42), ("T 'H2A'", 42)] {
-        assert_eq!(postures(Language::Krl, &pos(&format!(",{text}"))), [PostureStatement::Turn(bits)], "{text}");
+        assert_eq!(postures(Language::Krl, &pos(&format!(",{text}"))), [of(None, Some(bits))], "{text}");
     }
     assert_eq!(postures(Language::Krl, &pos("")), [PostureStatement::Unstated]);
-    assert_eq!(postures(Language::Krl, &pos(",S 2")), [PostureStatement::Unstated]);
+    assert_eq!(postures(Language::Krl, &pos(",S 2")), [of(Some(2), None)]);
+    assert_eq!(postures(Language::Krl, &pos(",S 'B110',T 27")), [of(Some(6), Some(27))]);
     for text in ["T -1", "T 1.5", "T 'B12'", "T x"] {
         assert!(
             refused(Language::Krl, &pos(&format!(",{text}")))[0].contains("expected a whole number or a bit pattern"),

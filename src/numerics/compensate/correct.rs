@@ -1,8 +1,9 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark, StatedPosture,
-    ToolGoal, Uncertainty, beyond_limits, inverse, least_change, one_step, posture::inverse_in,
+    ArmSides, Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark,
+    StatedPosture, ToolGoal, Uncertainty, beyond_limits, inverse, least_change, one_step,
+    posture::{CountedArm, inverse_in},
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -78,6 +79,8 @@ pub struct Corrector<'a> {
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
+    /// Of the nominal arm, where it has some.
+    sides: Option<ArmSides>,
     /// What of the model depends on motor currents.
     by_current: Option<String>,
     /// What of it depends on what no target states.
@@ -169,7 +172,8 @@ impl<'a> Corrector<'a> {
         let (joints, by_current) = (arm.model().robot.joints(), arm.by_current());
         let by_what_is_not_stated = arm.by_what_is_not_stated();
         let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
-        Self { arm, coverage, uncertainty, manner, by_current, by_what_is_not_stated, last: None, direction, tally }
+        let sides = ArmSides::of(&arm.model().robot, &manner.convention);
+        Self { arm, coverage, uncertainty, manner, sides, by_current, by_what_is_not_stated, last: None, direction, tally }
     }
 
     /// Whether targets get an uncertainty.
@@ -180,6 +184,11 @@ impl<'a> Corrector<'a> {
     /// How targets and commands count the joints.
     pub fn convention(&self) -> &JointConvention {
         &self.manner.convention
+    }
+
+    /// The sides of the nominal arm, where it has some.
+    pub fn sides(&self) -> Option<&ArmSides> {
+        self.sides.as_ref()
     }
 
     /// Answers in the order of the targets, which follow those of the batch before; their joints are as the controller counts them.
@@ -217,7 +226,8 @@ impl<'a> Corrector<'a> {
                 let wanted = ToolGoal { pose, oriented };
                 let seed = seed.unwrap_or_else(|| vec![0.0; n]);
                 let stated = target.posture.as_ref();
-                let stated = stated.map(|posture| inverse_in(robot, convention, &wanted, &seed, posture));
+                let counted = CountedArm { robot, convention, sides: self.sides.as_ref() };
+                let stated = stated.map(|posture| inverse_in(&counted, &wanted, &seed, posture));
                 other_posture = matches!(stated, Some(None));
                 (Some(wanted), stated.flatten().unwrap_or_else(|| inverse(robot, &wanted, &seed)))
             }

@@ -9,6 +9,8 @@ const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
 const FRAME: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
 const EXTERNALS: [&str; 6] = ["E1", "E2", "E3", "E4", "E5", "E6"];
 const STATUS: [&str; 2] = ["S", "T"];
+/// Bit of S.
+const ACCURATE: u32 = 16;
 
 /// A type of targets, by its fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -171,10 +173,28 @@ impl<'t> Aggregate<'t> {
         let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
         let external = EXTERNALS.into_iter().map(|name| given(name).map(|(_, value, _)| *value)).collect();
         let kind = if kind.axes { TargetKind::Joints } else { TargetKind::Frame };
-        let turn = given("T").map_or(PostureStatement::Unstated, |(_, value, _)| PostureStatement::Turn(*value as u32));
-        let status = given("S").map(|(.., span)| span.start);
-        found.status = found.status.or(status);
-        found.literals.push(Literal { kind, values, spans, external, posture: turn, frame: None, payload: None });
+        let [status, turn] = STATUS.map(|name| given(name).map(|(_, value, span)| (*value as u32, span)));
+        if let Some((_, span)) = status.filter(|(status, _)| status & ACCURATE != 0) {
+            let message = "S says that the point was taught at an absolutely accurate robot: calib assumed that the controller's own model of the robot's errors is off";
+            found.warn(span.start, message);
+        }
+        let posture_spans: Vec<Range<usize>> = [&status, &turn].into_iter().flatten().map(|(_, span)| (*span).clone()).collect();
+        let posture = match [status, turn].map(|stated| stated.map(|(bits, _)| bits)) {
+            [None, None] => PostureStatement::Unstated,
+            [status, turn] => PostureStatement::StatusTurn { status, turn },
+        };
+        found.literals.push(Literal {
+            kind,
+            values,
+            spans,
+            external,
+            posture,
+            posture_spans,
+            frame: None,
+            tool: None,
+            tool_in_force: None,
+            payload: None,
+        });
     }
 
     /// Name and number of a field; status and turn may be bit patterns.

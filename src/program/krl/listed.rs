@@ -5,15 +5,13 @@ use super::super::{Declared, Gathered, Language};
 use super::Reader;
 use super::aggregate::{Aggregate, Type};
 use super::line::{closing, declared, variable};
-use super::surroundings::SetSurroundings;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(in crate::program) fn listed(bytes: &[u8]) -> Declared {
     let mut found = Gathered::default();
     let source = ProgramText { bytes, language: Language::Krl };
     let tokens = tokens(source, &mut found);
-    let mut reader =
-        Reader { source, types: BTreeMap::new(), structures: BTreeSet::new(), surroundings: SetSurroundings::default(), found };
+    let mut reader = Reader { source, types: BTreeMap::new(), structures: BTreeSet::new(), names: Vec::new(), found };
     let (mut names, mut poses) = (Vec::new(), 0);
     for line in tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()) {
         let declares = declared(source, line).map(|(kind, _)| kind);

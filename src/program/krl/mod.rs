@@ -6,18 +6,21 @@
 //! absolute pose: such targets are refused, and so is every aggregate that may be a target and of which the file does not tell.
 
 mod aggregate;
-mod frames;
 mod line;
 mod listed;
-mod surroundings;
+mod reached;
+mod steps;
+mod system;
 
+use super::settle::{Reached, Words, settle};
 use super::token::{ProgramText, Token, TokenKind, tokens};
-use super::{DEPTH, Gathered, Language, quoted};
+use super::{Companion, DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
 pub(super) use listed::listed;
 use std::collections::{BTreeMap, BTreeSet};
-use surroundings::SetSurroundings;
+use std::ops::Range;
+use system::SystemData;
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
@@ -33,14 +36,20 @@ const RELATIVE: &str = "the geometric operator `:` makes a relative pose of its 
 /// Types of the system with fields that targets have as well.
 const KNOWN: [&str; 2] = ["FRAME", "INERTIA"];
 
+const WORDS: Words = Words {
+    base: "$BASE",
+    tool: "$TOOL",
+    no_base: "no $BASE is set before this target: calib assumed that it stands in the robot's base",
+};
+
 /// Frames of the system that are kept in files.
 const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
-pub(super) fn read(bytes: &[u8]) -> Gathered {
+pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
     let mut found = Gathered::default();
     let source = ProgramText { bytes, language: Language::Krl };
-    let tokens = tokens(source, &mut found);
-    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()).collect();
+    let own = tokens(source, &mut found);
+    let lines = lines(&own);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for line in &lines {
         if let Some((kind, names)) = declared(source, line) {
@@ -53,13 +62,49 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
         }
     }
     let structures = lines.iter().filter_map(|line| structure(source, line)).collect();
-    let surroundings = SetSurroundings::of(source, &lines);
-    let mut reader = Reader { source, types, structures, surroundings, found };
-    for line in lines {
+    let mut reader = Reader { source, types, structures, names: Vec::new(), found };
+    for line in &lines {
         reader.line(line);
     }
-    reader.surroundings.settle(&mut reader.found);
-    reader.found
+    let Reader { names, mut found, .. } = reader;
+    in_force(source, &lines, companions, &names, &mut found);
+    found
+}
+
+/// Statements, one a line.
+fn lines(tokens: &[Token]) -> Vec<&[Token]> {
+    tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()).collect()
+}
+
+/// Gives targets their frames, tools and loads, by all files of the program.
+fn in_force(
+    source: ProgramText,
+    own: &[&[Token]],
+    companions: &[Companion],
+    names: &[(Range<usize>, String)],
+    found: &mut Gathered,
+) {
+    // What is wrong with the writing of another file is no fault of this one.
+    let read = |companion: &Companion| tokens(companion.text(Language::Krl), &mut Gathered::default());
+    let others: Vec<Vec<Token>> = companions.iter().map(read).collect();
+    let (mut data, mut reached) = (SystemData::default(), Reached::default());
+    let companions = || companions.iter().zip(&others);
+    for (companion, tokens) in companions() {
+        data.declare(companion.text(Language::Krl), &lines(tokens));
+        data.declare_routines(companion.text(Language::Krl), &lines(tokens));
+    }
+    data.declare(source, own);
+    reached::reach(source, own, &data, None, &mut reached);
+    for (companion, tokens) in companions() {
+        reached::reach(companion.text(Language::Krl), &lines(tokens), &data, Some(companion.place), &mut reached);
+    }
+    let uses = reached.uses(&found.literals, names);
+    settle(found, uses, &WORDS);
+    let mut called = BTreeSet::new();
+    if found.literals.iter().any(|literal| literal.frame.is_some() || literal.tool_in_force.is_some()) {
+        found.warnings.extend(reached.assumed.into_iter().filter(|(_, message)| called.insert(message.clone())));
+    }
+    found.tools = data.tools().collect();
 }
 
 struct Reader<'p> {
@@ -68,7 +113,8 @@ struct Reader<'p> {
     types: BTreeMap<String, Vec<String>>,
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
-    surroundings: SetSurroundings,
+    /// Literals that a variable holds, by their numbers, and its name.
+    names: Vec<(Range<usize>, String)>,
     found: Gathered,
 }
 
@@ -77,7 +123,6 @@ impl Reader<'_> {
         if !self.braces_match(line) {
             return;
         }
-        frames::set(self.source, line, &self.surroundings, &mut self.found);
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
             if head.ends_with("_REL") {
@@ -221,6 +266,9 @@ impl Reader<'_> {
                 let before = self.found.literals.len();
                 self.value(&line[..k], &line[k..=close], declares.as_deref());
                 let taken = self.found.literals.len() > before;
+                if let Some((name, _)) = variable(self.source, &line[..k]).filter(|_| taken) {
+                    self.names.push((before..self.found.literals.len(), name));
+                }
                 if let Some(stray) = line.get(close + 1).filter(|next| taken && !next.is(b',')) {
                     let text = quoted(self.source.bytes, stray.span.clone());
                     self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
@@ -252,17 +300,12 @@ impl Reader<'_> {
         let (name, member) = variable(self.source, before).unwrap_or_default();
         let prefix = aggregate.prefix();
         if name.starts_with('$') {
-            // Of its frames `system` has told.
             if aggregate.by_fields().is_of_axes() || prefix.as_deref().and_then(Type::of).is_some() {
                 self.found.warn(at, format!("left as it is: `{name}` is a variable of the system"));
             }
             return;
         }
         if FRAME_TABLES.contains(&name.as_str()) {
-            let variable = if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" };
-            if !self.surroundings.applies(variable) {
-                self.found.frame(at, frames::assumed(variable));
-            }
             return;
         }
         let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);
@@ -282,9 +325,7 @@ impl Reader<'_> {
     /// An aggregate of a type that is none of targets: it is left where the type is known, or declared in this file.
     fn of_other_type(&mut self, kind: &str, tokens: &[Token]) {
         let at = tokens[0].span.start;
-        if kind == "FDAT" {
-            frames::of_point(self.source, tokens, &self.surroundings, &mut self.found);
-        } else if !KNOWN.contains(&kind) && Aggregate::new(self.source, tokens).may_be_target() {
+        if kind != "FDAT" && !KNOWN.contains(&kind) && Aggregate::new(self.source, tokens).may_be_target() {
             if self.structures.contains(kind) {
                 self.found.warn(at, format!("left as it is: {kind} is a structure of this file and no type of targets"));
             } else {

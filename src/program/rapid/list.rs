@@ -172,6 +172,10 @@ impl<'t> List<'t> {
         let axis = |(value, _): &(f64, _)| (*value != NOT_CONNECTED).then_some(*value);
         let external = numbers.last().into_iter().flatten().map(axis).collect();
         let posture = if want == Want::Pose { configuration(&numbers[2], found) } else { PostureStatement::Unstated };
+        let posture_spans = match posture {
+            PostureStatement::Unstated => Vec::new(),
+            _ => numbers[2].iter().map(|(_, span)| span.clone()).collect(),
+        };
         let used = if want == Want::Joints { 1 } else { 2 };
         let (values, spans): (Vec<f64>, Vec<Range<usize>>) = numbers.into_iter().take(used).flatten().unzip();
         if want == Want::Pose {
@@ -182,7 +186,18 @@ impl<'t> List<'t> {
             }
         }
         let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal { kind, values, spans, external, posture, frame: None, payload: None });
+        found.literals.push(Literal {
+            kind,
+            values,
+            spans,
+            external,
+            posture,
+            posture_spans,
+            frame: None,
+            tool: None,
+            tool_in_force: None,
+            payload: None,
+        });
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {
@@ -208,19 +223,26 @@ impl<'t> List<'t> {
     }
 }
 
-/// cf1, cf4, cf6 of `[cf1,cf4,cf6,cfx]`: whole quarter turns.
+/// `[cf1,cf4,cf6,cfx]`: whole quarter turns, and one of eight configurations.
 fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> PostureStatement {
     const MOST: f64 = 100.0;
-    let mut quadrants = [0; 3];
-    for (quadrant, (value, span)) in quadrants.iter_mut().zip(numbers) {
-        if *value == NOT_CONNECTED {
-            return PostureStatement::Unstated;
-        }
-        if value.fract() != 0.0 || value.abs() > MOST {
-            found.fault(span.start, format!("{value} is no quadrant of a joint, expected a whole number"));
-            return PostureStatement::Unstated;
-        }
-        *quadrant = *value as i32;
+    let mut all = [0; 4];
+    if numbers.iter().any(|(value, _)| *value == NOT_CONNECTED) {
+        return PostureStatement::Unstated;
     }
-    PostureStatement::Quadrants(quadrants)
+    for (k, (own, (value, span))) in all.iter_mut().zip(numbers).enumerate() {
+        let fault = match k {
+            3 if value.fract() != 0.0 || !(0.0..8.0).contains(value) => {
+                "no configuration cfx, expected a whole number from 0 to 7"
+            }
+            _ if value.fract() != 0.0 || value.abs() > MOST => "no quadrant of a joint, expected a whole number",
+            _ => {
+                *own = *value as i32;
+                continue;
+            }
+        };
+        found.fault(span.start, format!("{value} is {fault}"));
+        return PostureStatement::Unstated;
+    }
+    PostureStatement::Configuration(all)
 }

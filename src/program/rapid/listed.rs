@@ -3,7 +3,6 @@
 use super::super::token::{ProgramText, Token, TokenKind, tokens};
 use super::super::{Declared, Gathered, Language};
 use super::list::{List, Want};
-use super::surroundings::DeclaredSurroundings;
 use super::{Reader, declaration, statements};
 use std::collections::BTreeMap;
 
@@ -12,7 +11,7 @@ pub(in crate::program) fn listed(bytes: &[u8]) -> Declared {
     let source = ProgramText { bytes, language: Language::Rapid };
     let tokens = tokens(source, &mut found);
     let statements = statements(source, &tokens, &mut found);
-    let mut reader = Reader { source, types: BTreeMap::new(), surroundings: DeclaredSurroundings::default(), found };
+    let mut reader = Reader { source, types: BTreeMap::new(), names: Vec::new(), found };
     let (mut names, mut poses) = (Vec::new(), 0);
     for statement in statements {
         let Some((value, kind)) = declaration(source, statement).and_then(|own| Some((own.value?, own.kind))) else { continue };

@@ -8,15 +8,17 @@
 mod arguments;
 mod list;
 mod listed;
+mod reached;
 mod surroundings;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
-use super::{DEPTH, Gathered, Language, quoted};
+use super::{Companion, DEPTH, Gathered, Language, quoted};
 use arguments::{arguments, depths};
 use list::{List, Want};
 pub(super) use listed::listed;
+use reached::in_force;
 use std::collections::BTreeMap;
-use surroundings::DeclaredSurroundings;
+use std::ops::Range;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -60,11 +62,11 @@ const STORAGE: [&str; 3] = ["VAR", "PERS", "CONST"];
 /// Types whose literals may have the form of a target and are none.
 const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
 
-pub(super) fn read(bytes: &[u8]) -> Gathered {
+pub(super) fn read(bytes: &[u8], companions: &[Companion]) -> Gathered {
     let mut found = Gathered::default();
     let source = ProgramText { bytes, language: Language::Rapid };
-    let tokens = tokens(source, &mut found);
-    let statements = statements(source, &tokens, &mut found);
+    let own = tokens(source, &mut found);
+    let statements = statements(source, &own, &mut found);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for statement in &statements {
         if let Some(declaration) = declaration(source, statement) {
@@ -74,13 +76,18 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
             }
         }
     }
-    let surroundings = DeclaredSurroundings::of(source, &statements);
-    let mut reader = Reader { source, types, surroundings, found };
-    for statement in statements {
+    let mut reader = Reader { source, types, names: Vec::new(), found };
+    for statement in &statements {
         reader.statement(statement);
     }
-    reader.surroundings.settle(&mut reader.found);
-    reader.found
+    let Reader { names, mut found, .. } = reader;
+    in_force((source, &statements), companions, &names, &mut found);
+    found
+}
+
+/// The motion instruction of this name, in capitals.
+fn motion(name: &str) -> Option<(&'static str, &'static [usize])> {
+    MOTIONS.into_iter().find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION)
 }
 
 /// The statements of a program, each without its `;` and without the heads of blocks before it. A value that no `;` ends before the
@@ -158,7 +165,8 @@ struct Reader<'p> {
     source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
-    surroundings: DeclaredSurroundings,
+    /// Literals that a variable holds, by their numbers, and its name.
+    names: Vec<(Range<usize>, String)>,
     found: Gathered,
 }
 
@@ -213,21 +221,9 @@ impl Reader<'_> {
         self.found.faults.len() == before
     }
 
-    /// Work objects, tools and displacements that a statement names.
+    /// Displacements.
     fn frames(&mut self, statement: &[Token]) {
         const BASE: &str = "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
-        for (k, token) in statement.iter().enumerate().filter(|(_, token)| token.is(b'\\')) {
-            let rest = &statement[k + 1..];
-            let Some(name) = rest.first() else { continue };
-            let value = quoted(self.source.bytes, rest.get(2).map_or(name.span.clone(), |value| value.span.clone()));
-            let applied =
-                |value: &Token| self.source.is_word(value, &["WOBJ0"]) || self.surroundings.has_object(&self.source.upper(value));
-            if self.source.is_word(name, &["WOBJ"]) && !rest.get(2).is_some_and(applied) {
-                self.found.frame(token.span.start, format!("work object {value}: {BASE}"));
-            } else if self.source.is_word(name, &["TOOL"]) {
-                self.found.frame(token.span.start, format!("tool {value}: calib assumed that it is the tool of the robot file"));
-            }
-        }
         let head = &statement[0];
         if self.source.is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
             let name = quoted(self.source.bytes, head.span.clone());
@@ -252,7 +248,7 @@ impl Reader<'_> {
                 } else {
                     let before = self.found.literals.len();
                     list.take(want, true, &mut self.found);
-                    self.surroundings.named(before..self.found.literals.len(), name);
+                    self.names.push((before..self.found.literals.len(), name));
                 }
             }
             _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
@@ -307,20 +303,15 @@ impl Reader<'_> {
 
     fn instruction(&mut self, statement: &[Token]) {
         let name = self.source.upper(&statement[0]);
-        if name == "GRIPLOAD" {
-            self.surroundings.grip(self.source, statement, &mut self.found);
-        }
-        let motion = MOTIONS.iter().find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION);
-        let Some((begin, positions)) = motion else {
+        let Some((begin, positions)) = motion(&name) else {
             return self.others(statement, format!("`{name}`, no motion instruction that calib knows"));
         };
-        if *begin == "MOVEEXTJ" {
+        if begin == "MOVEEXTJ" {
             self.found.warn(statement[0].span.start, "moves external axes alone: calib assumed that they do not move the robot");
             return;
         }
         let want = if name.contains("ABSJ") { Want::Joints } else { Want::Pose };
         let (mut number, arguments) = (0, arguments(&statement[1..]));
-        self.surroundings.motion(self.source, &name, &arguments, positions, self.found.literals.len());
         for argument in arguments {
             let Some(first) = argument.first() else {
                 number += 1;

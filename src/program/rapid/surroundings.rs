@@ -1,84 +1,71 @@
-//! In which frame and under which load targets are reached: the tools, work objects and loads that a program declares, and the motions
-//! that name them.
+//! In which frame, with which tool and under which load targets are reached: the tools, work objects and loads that the files of a program
+//! declare, and the motions that name them.
 //!
 //! `tooldata`: [robhold, tframe, tload]; `wobjdata`: [robhold, ufprog, ufmec, uframe, oframe]; `loaddata`: [mass, ...] (ABB, Technical
 //! reference manual RAPID). A work object is applied where it stands still and the program alone says where; the world frame is taken as
 //! the robot's base.
 
+use super::super::force::{InForce, Setting, ToolInForce};
+use super::super::quoted;
+use super::super::settle::Reached;
 use super::super::token::{ProgramText, Token, TokenKind};
-use super::super::{Gathered, TargetKind, quoted};
 use super::list::List;
 use super::{Declaration, declaration};
 use crate::spatial::Pose;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
+use std::collections::BTreeMap;
 
 /// Instructions whose last positional argument is the tool.
 const TOOL_LAST: [&str; 4] = ["MOVEL", "MOVEJ", "MOVEC", "MOVEABSJ"];
 
-/// The work object of the robot's base, and the tool and the load of nothing.
-const NONE: [&str; 3] = ["WOBJ0", "TOOL0", "LOAD0"];
+/// A value that the program sets when it runs.
+const SET: &str = "is set when the program runs";
 
-/// A target by its name in the program, or by its number where it stands in a motion.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-enum UsedTarget {
-    Named(String),
-    Literal(usize),
-}
+/// Something declared, or why its declaration does not say what it is.
+type DeclaredValue<T> = Result<T, String>;
 
-/// What a motion names beside its position, in capitals.
-#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct MotionUse {
-    object: Option<String>,
-    tool: Option<String>,
-    /// The total load, instead of the tool's.
-    load: Option<String>,
-}
-
-/// What a program declares and names of them.
+/// What the files of a program declare.
 #[derive(Debug, Default)]
 pub(super) struct DeclaredSurroundings {
-    /// Work objects in the robot's base; none where the declaration does not say, or the program sets it.
-    objects: BTreeMap<String, Option<Pose>>,
-    /// Masses of tools and loads, kg; none likewise.
+    /// Work objects in the robot's base.
+    objects: BTreeMap<String, DeclaredValue<Pose>>,
+    /// Frames of tools at the flange.
+    tools: BTreeMap<String, DeclaredValue<Pose>>,
+    /// Masses of tools and loads, kg; none where they are not stated.
     masses: BTreeMap<String, Option<f64>>,
-    uses: BTreeMap<UsedTarget, BTreeSet<MotionUse>>,
-    /// Literals that a variable holds.
-    names: Vec<(Range<usize>, String)>,
     /// Where a load is gripped that is none.
-    gripped: bool,
+    gripped: Option<String>,
 }
 
 impl DeclaredSurroundings {
-    /// What the statements declare.
-    pub fn of(source: ProgramText, statements: &[&[Token]]) -> Self {
-        let mut out = Self::default();
+    /// Adds what the statements of a file declare, and the loads that they grip.
+    pub fn declare_all(&mut self, source: ProgramText, statements: &[&[Token]]) {
         for statement in statements {
             match declaration(source, statement) {
-                Some(Declaration { kind, name, value, .. }) => out.declare(source, &kind, name, value.unwrap_or_default()),
-                None => out.unset(source, statement),
+                Some(Declaration { kind, name, value, .. }) => self.declare(source, &kind, name, value.unwrap_or_default()),
+                None if source.is_word(&statement[0], &["GRIPLOAD"]) => self.grip(source, statement),
+                None => {}
             }
         }
-        out
+        for statement in statements.iter().filter(|statement| declaration(source, statement).is_none()) {
+            self.unset(source, statement);
+        }
     }
 
     fn declare(&mut self, source: ProgramText, kind: &str, name: String, value: &[Token]) {
         let list = value.first().filter(|first| first.is(b'[')).map(|_| List::read(source, value));
         let mass = |load: &List| load.number(0).filter(|mass| *mass >= 0.0);
         match kind {
-            "WOBJDATA" => {
-                let still = |list: &List| !list.is_word(0, "TRUE") && list.is_word(1, "TRUE");
-                let pose = list.filter(still).and_then(|list| Some(frame(list.list(3)?)? * frame(list.list(4)?)?));
-                self.objects.insert(name, pose);
-            }
+            "WOBJDATA" => note(&mut self.objects, name, object(list.as_ref())),
             "TOOLDATA" => {
-                let mass = list.filter(|list| list.is_word(0, "TRUE")).and_then(|list| mass(list.list(2)?));
-                self.masses.insert(name, mass);
+                let carried = list.filter(|list| list.is_word(0, "TRUE"));
+                let load = carried.as_ref().and_then(|list| mass(list.list(2)?));
+                let pose = carried.as_ref().and_then(|list| frame(list.list(1)?));
+                let still = "stands still, or is not declared with its numbers: expected one that the robot carries";
+                note(&mut self.tools, name.clone(), pose.ok_or_else(|| still.into()));
+                self.masses.insert(name, load);
             }
-            "LOADDATA" => {
-                self.masses.insert(name, list.and_then(|list| mass(&list)));
-            }
+            "LOADDATA" => drop(self.masses.insert(name, list.and_then(|list| mass(&list)))),
             _ => {}
         }
     }
@@ -88,136 +75,133 @@ impl DeclaredSurroundings {
         let assigns = statement.iter().any(|token| token.sort == TokenKind::Pair(b':'));
         let Some(first) = statement.first().filter(|first| assigns && first.sort == TokenKind::Word) else { return };
         let name = source.upper(first);
+        let of_load = statement.windows(2).any(|w| w[0].is(b'.') && source.is_word(&w[1], &["TLOAD"]));
         if let Some(pose) = self.objects.get_mut(&name) {
-            *pose = None;
+            *pose = Err(SET.into());
+        }
+        if let Some(pose) = self.tools.get_mut(&name).filter(|_| !of_load) {
+            *pose = Err(SET.into());
         }
         if let Some(mass) = self.masses.get_mut(&name) {
             *mass = None;
         }
     }
 
-    /// Whether a work object is applied.
-    pub fn has_object(&self, name: &str) -> bool {
-        self.objects.get(name).is_some_and(Option::is_some)
+    /// `GripLoad`: from there on another load is carried, and where that is the order of execution alone says.
+    fn grip(&mut self, source: ProgramText, statement: &[Token]) {
+        if statement.get(1).is_none_or(|load| !source.is_word(load, &["LOAD0"])) {
+            let text = quoted(source.bytes, source.over(statement, 0));
+            self.gripped.get_or_insert_with(|| format!("changes when the program runs: {text}"));
+        }
     }
 
-    /// Takes note of what a motion names: `arguments` between its commas, `positions` by which of them are positions.
+    /// Frames of tools by their names, as the files declare them.
+    pub fn tools(&self) -> impl Iterator<Item = ToolInForce> + '_ {
+        self.tools.iter().map(|(name, frame)| ToolInForce { name: name.clone(), frame: frame.clone().ok() })
+    }
+
+    /// Takes note of what a motion names: `arguments` between its commas, `positions` by which of them are positions. Of a motion of another
+    /// file the names alone count.
     pub fn motion(
-        &mut self,
+        &self,
         source: ProgramText,
-        instruction: &str,
-        arguments: &[&[Token]],
-        positions: &[usize],
-        literals: usize,
+        (instruction, arguments, positions): (&str, &[&[Token]], &[usize]),
+        is_own: bool,
+        out: &mut Reached,
     ) {
-        let mut named = MotionUse::default();
+        let force = self.in_force(source, instruction, arguments);
+        let positional = arguments.iter().filter(|argument| argument.first().is_none_or(|first| !first.is(b'\\')));
+        for (_, argument) in positional.enumerate().filter(|(number, _)| positions.contains(number)) {
+            let name = match argument.first() {
+                Some(first) if first.is(b'[') => {
+                    let span = source.over(argument, first.span.start);
+                    out.placed.extend(is_own.then(|| (span, force.clone())));
+                    continue;
+                }
+                Some(first) if source.is_word(first, &["OFFS", "RELTOOL"]) && argument.len() > 2 => &argument[2],
+                Some(first) => first,
+                None => continue,
+            };
+            out.named.entry(source.upper(name)).or_default().push(force.clone());
+        }
+    }
+
+    /// What is in force by the arguments of a motion.
+    fn in_force(&self, source: ProgramText, instruction: &str, arguments: &[&[Token]]) -> InForce {
+        let (mut object, mut tool, mut load) = (None, None, None);
         let plain = || arguments.iter().filter(|argument| argument.first().is_some_and(|first| first.sort == TokenKind::Word));
         for argument in plain() {
-            let name = source.upper(&argument[0]);
-            if self.masses.contains_key(&name) && argument.get(1).is_none_or(|next| next.is(b'\\')) {
-                named.tool = Some(name);
+            let known = self.masses.contains_key(&source.upper(&argument[0]));
+            if known && argument.get(1).is_none_or(|next| next.is(b'\\')) {
+                tool = Some(&argument[0]);
             }
         }
-        if named.tool.is_none() && TOOL_LAST.contains(&instruction) {
-            named.tool = plain().next_back().map(|last| source.upper(&last[0]));
+        if tool.is_none() && TOOL_LAST.contains(&instruction) {
+            tool = plain().next_back().map(|last| &last[0]);
         }
         for tokens in arguments.iter().flat_map(|argument| argument.windows(4)) {
             let slot = match () {
-                () if source.is_word(&tokens[1], &["WOBJ"]) => &mut named.object,
-                () if source.is_word(&tokens[1], &["TLOAD"]) => &mut named.load,
+                () if source.is_word(&tokens[1], &["WOBJ"]) => &mut object,
+                () if source.is_word(&tokens[1], &["TLOAD"]) => &mut load,
                 () => continue,
             };
             if tokens[0].is(b'\\') && tokens[2].sort == TokenKind::Pair(b':') {
-                *slot = Some(source.upper(&tokens[3])).filter(|name| !NONE.contains(&name.as_str()));
+                *slot = Some(&tokens[3]).filter(|token| !source.is_word(token, &["LOAD0"]));
             }
         }
-        let mut literal = literals;
-        let positional = arguments.iter().filter(|argument| argument.first().is_none_or(|first| !first.is(b'\\')));
-        for (_, argument) in positional.enumerate().filter(|(number, _)| positions.contains(number)) {
-            let target = match argument.first() {
-                Some(first) if first.is(b'[') => {
-                    literal += 1;
-                    UsedTarget::Literal(literal - 1)
-                }
-                Some(first) if source.is_word(first, &["OFFS", "RELTOOL"]) && argument.len() > 2 => {
-                    UsedTarget::Named(source.upper(&argument[2]))
-                }
-                Some(first) => UsedTarget::Named(source.upper(first)),
-                None => continue,
-            };
-            self.uses.entry(target).or_default().insert(named.clone());
-        }
-    }
-
-    /// Takes note that literals of these numbers are the values of a variable.
-    pub fn named(&mut self, literals: Range<usize>, name: String) {
-        self.names.push((literals, name));
-    }
-
-    /// `GripLoad`: from there on another load is carried, and where that is the order of execution alone says.
-    pub fn grip(&mut self, source: ProgramText, statement: &[Token], found: &mut Gathered) {
-        if statement.get(1).is_none_or(|load| !source.is_word(load, &["LOAD0"])) {
-            self.gripped = true;
-            let load = quoted(source.bytes, statement.last().map_or(0..0, |last| statement[0].span.start..last.span.end));
-            found.warn(statement[0].span.start, format!("{load} changes the load: the program states no payload of its targets"));
-        }
-    }
-
-    /// Gives literals their frames and payloads, and says which they are.
-    pub fn settle(self, found: &mut Gathered) {
-        let mut told = BTreeSet::new();
-        let mut notes: Vec<(bool, usize, String)> = Vec::new();
-        let mut of_the_file: Option<String> = None;
-        for (k, literal) in found.literals.iter_mut().enumerate() {
-            let name = self.names.iter().find(|(literals, _)| literals.contains(&k)).map(|(_, name)| name.clone());
-            let target = name.map_or(UsedTarget::Literal(k), UsedTarget::Named);
-            let Some(uses) = self.uses.get(&target) else { continue };
-            let at = literal.at();
-            let objects: BTreeSet<Option<&str>> = uses.iter().map(|used| used.object.as_deref()).collect();
-            let tools: BTreeSet<&str> = uses.iter().filter_map(|used| used.tool.as_deref()).collect();
-            if literal.kind != TargetKind::Joints {
-                if objects.len() > 1 {
-                    notes.push((true, at, "is reached in more than one work object, and has one correction".into()));
-                } else if let Some(Some(object)) = objects.first()
-                    && let Some(Some(pose)) = self.objects.get(*object)
-                {
-                    literal.frame = Some(*pose);
-                    if told.insert((*object).to_string()) {
-                        notes.push((
-                            false,
-                            at,
-                            format!("work object `{object}` is applied as this program declares it, in the robot's base"),
-                        ));
-                    }
-                }
-                if tools.len() > 1 {
-                    let tools = tools.iter().map(|tool| format!("`{tool}`")).collect::<Vec<_>>().join(", ");
-                    notes.push((true, at, format!("is reached with the tools {tools}, of which the robot file has one")));
-                } else if let Some(tool) = tools.first() {
-                    if let Some(first) = of_the_file.as_ref().filter(|first| *first != tool) {
-                        let why = format!(
-                            "is reached with the tool `{tool}`, another target with `{first}`, of which the robot file has one"
-                        );
-                        notes.push((true, at, why));
-                    }
-                    of_the_file.get_or_insert_with(|| (*tool).to_string());
-                }
+        let written = |token: &Token| quoted(source.bytes, token.span.clone());
+        let base = match object {
+            None => Setting::Known(Pose::identity(), "wobj0".into()),
+            Some(object) if source.is_word(object, &["WOBJ0"]) => Setting::Known(Pose::identity(), "wobj0".into()),
+            Some(object) => match self.objects.get(&source.upper(object)) {
+                Some(Ok(pose)) => Setting::Known(*pose, format!("work object {}", written(object))),
+                Some(Err(why)) => Setting::Open(format!("{} {why}", written(object))),
+                None => Setting::Open(format!("{} is declared in none of the files that were read", written(object))),
+            },
+        };
+        let of_tool = |token: &Token| {
+            let name = source.upper(token);
+            let frame = if name == "TOOL0" { Some(Ok(Pose::identity())) } else { self.tools.get(&name).cloned() };
+            match frame.transpose() {
+                Ok(frame) => Setting::Known(ToolInForce { name, frame }, written(token)),
+                Err(why) => Setting::Open(format!("{} {why}", written(token))),
             }
-            let load = |used: &MotionUse| used.load.clone().or_else(|| used.tool.clone());
-            let loads: BTreeSet<Option<String>> = uses.iter().map(load).collect();
-            let masses: Vec<Option<f64>> =
-                loads.iter().map(|load| load.as_ref().and_then(|load| self.masses.get(load).copied().flatten())).collect();
-            literal.payload = masses[0].filter(|_| !self.gripped && masses.iter().all(|mass| *mass == masses[0]));
-            if let (Some(mass), Some(Some(load))) = (literal.payload, loads.first())
-                && told.insert(load.clone())
-            {
-                notes.push((false, at, format!("payload {mass} kg, as `{load}` states")));
+        };
+        InForce { base, tool: tool.map_or(Setting::Unset, of_tool), load: self.load(source, load.or(tool)) }
+    }
+
+    fn load(&self, source: ProgramText, by: Option<&Token>) -> Setting<Option<f64>> {
+        match (&self.gripped, by) {
+            (Some(why), _) => Setting::Open(why.clone()),
+            (None, Some(by)) => {
+                let mass = self.masses.get(&source.upper(by)).copied().flatten();
+                Setting::Known(mass, quoted(source.bytes, by.span.clone()))
             }
-        }
-        for (refuses, at, note) in notes {
-            if refuses { found.frame(at, note) } else { found.warn(at, note) }
+            (None, None) => Setting::Unset,
         }
     }
+}
+
+/// Takes note of a second declaration of one name, which may be another routine's.
+fn note(known: &mut BTreeMap<String, DeclaredValue<Pose>>, name: String, value: DeclaredValue<Pose>) {
+    match known.get_mut(&name) {
+        Some(before) if *before != value => *before = Err("is declared twice, with other numbers".into()),
+        Some(_) => {}
+        None => drop(known.insert(name, value)),
+    }
+}
+
+/// A work object in the robot's base.
+fn object(list: Option<&List>) -> DeclaredValue<Pose> {
+    let Some(list) = list else { return Err("is not declared with its numbers".into()) };
+    if list.is_word(0, "TRUE") {
+        return Err("is carried by the robot: expected one that stands still".into());
+    }
+    if !list.is_word(1, "TRUE") {
+        return Err("is moved by a mechanical unit or a conveyor: expected one that stands still".into());
+    }
+    let pose = list.list(3).and_then(frame).zip(list.list(4).and_then(frame)).map(|(user, own)| user * own);
+    pose.ok_or_else(|| "is not declared with its numbers".into())
 }
 
 /// `[[x, y, z], [q1, q2, q3, q4]]`, mm.

@@ -2,6 +2,7 @@
 //! is recorded, identified and compensated under every convention; where it really goes is the same to a micrometre.
 
 use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
+use super::sides::confdata;
 use super::true_error::Cell;
 use super::{ROBOT, calib};
 use calib::compensate::{Nominal, ToolGoal, least_change, turns};
@@ -63,7 +64,6 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
     std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).expect("a file");
     let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
 
-    let quadrant = |c: f64| (c / 90.0).floor() as i32;
     let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
         .iter()
         .map(|target| {
@@ -86,8 +86,8 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
         .iter()
         .map(|(counted, [x, y, z], turn)| {
             let q = format!("{:.10},{:.10},{:.10},{:.10}", turn.w, turn.i, turn.j, turn.k);
-            let [one, four, six] = [0, 3, 5].map(|joint| quadrant(counted[joint]));
-            format!("MoveL [[{x:.6},{y:.6},{z:.6}],[{q}],[{one},{four},{six},0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n")
+            let [one, four, six, cfx] = confdata(maker, &maker.driven(counted));
+            format!("MoveL [[{x:.6},{y:.6},{z:.6}],[{q}],[{one},{four},{six},{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n")
         })
         .collect();
     std::fs::write(here.join("poses.mod"), format!("MODULE m\n{rapid_poses}ENDMODULE\n")).expect("a file");

@@ -97,7 +97,7 @@ fn a_target_in_a_work_object_is_corrected_where_it_stands() {
     std::fs::write(cell().join("object.mod"), program).expect("a file");
     let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("work object `FIXTURE` is applied as this program declares it"), "{err}");
+    assert!(err.contains("work object `fixture` is applied, in the robot's base"), "{err}");
     let (plain, within) = (numbers(&plain), numbers(&within));
     let there = [100.0 - within[0], 20.0 - within[1], within[2] - 30.0];
     assert!(there.iter().zip(&plain).all(|(a, b)| (a - b).abs() < 2e-5), "{there:?} {plain:?}");

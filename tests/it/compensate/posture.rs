@@ -122,9 +122,12 @@ fn programs_state_postures_and_are_told_once_where_they_do_not() {
     // Joint 3 below 0, by number and by bits.
     let (code, by_number, err) = run("t.src", &krl(",S 2,T 4"));
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("S is not checked") && !err.contains("posture not stated"), "{err}");
+    assert!(!err.contains("posture"), "{err}");
     let (_, by_bits, err) = run("b.src", &krl(",T 'B000100'"));
-    assert!(!err.contains("S is not checked"), "{err}");
+    assert!(!err.contains("posture"), "{err}");
+    let (code, _, err) = run("s.src", &krl(",S 3,T 4"));
+    assert_eq!(code, Some(10), "{err}");
+    assert!(err.contains("not reached in the posture that is stated (S 3, T 4)"), "{err}");
     let targets =
         |text: &str| text.lines().filter(|line| line.starts_with("LIN")).map(|line| line[..60].to_string()).collect::<Vec<_>>();
     assert_eq!(targets(&by_number), targets(&by_bits));

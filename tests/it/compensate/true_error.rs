@@ -118,6 +118,18 @@ impl Cell {
         Recorded { robot: Robot::from_description(&self.robot), recording, split }
     }
 
+    /// The model of a recording of 80 points, with the geometry alone.
+    pub fn identified(&self) -> Model {
+        let Recorded { robot, recording, split } = self.recorded(80, &[0.0]);
+        let rigid: Identify = serde_json::from_value(json!({
+            "effects": ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"], "folds": 0,
+        }))
+        .expect("settings");
+        let tables = Desk::default().run(&rigid, IdentifyReads { robot, recording, split }).expect("an identification");
+        let parameters: Parameters = table(&tables).remove(0);
+        parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model")
+    }
+
     /// What `diagnose` makes of it: the model, its findings, the noise of a measured point, mm.
     fn diagnosed(&self, recorded: Recorded) -> (Model, Findings, f64) {
         let stage: Diagnose = serde_json::from_value(serde_json::json!({})).expect("settings");

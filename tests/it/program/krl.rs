@@ -79,13 +79,7 @@ fn the_operands_of_the_geometric_operator_are_no_absolute_poses() {
     let text = format!("DEF F(A:IN,B:OUT)\n$BASE=EK1:{operand}\nL1:\nPTP {{A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}}\nXP2=XP1:XOFF\n");
     let (found, warned) = accepted(Language::Krl, &text);
     assert_eq!(found.len(), 1);
-    assert_eq!(
-        warned,
-        [
-            "2:1: sets $BASE: calib assumed that targets are in the robot's base, $BASE and $ROBROOT at zero",
-            "5:8: left as it is: a pose that the program computes by the geometric operator `:`",
-        ]
-    );
+    assert_eq!(warned, ["5:8: left as it is: a pose that the program computes by the geometric operator `:`",]);
 }
 
 #[test]
@@ -111,24 +105,20 @@ fn partial_targets_are_listed_and_left_where_that_is_wished() {
 }
 
 #[test]
-fn what_a_program_sets_that_calib_took_for_granted_is_told_by_line() {
-    let target = "{X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 'B1010',E1 1500.0,E2 0.0}";
-    let text = format!(
-        "$BASE={{X 0,Y 0,Z 0,A 0,B 0,C 0}}\n$TOOL.X = 5\nIF $BASE==$NULLFRAME THEN\nBAS(#TOOL,2)\nSLIN {target} WITH $TOOL={{X 1,Y 0,Z 0,A 0,B 0,C 0}}, $IPO_MODE=#TCP\nDECL FDAT FP1={{TOOL_NO 1,BASE_NO 3,IPO_FRAME #BASE,POINT2[] \" \"}}\nDECL FDAT FP2={{TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE,POINT2[] \" \"}}\n"
-    );
-    let base = "calib assumed that targets are in the robot's base, $BASE and $ROBROOT at zero";
-    let tool = "calib assumed that its frame is the tool of the robot file";
+fn what_calib_takes_for_granted_is_told_at_the_target() {
+    let target = "{X 1,Y 2,Z 3,A 4,B 5,C 6,S 18,T 'B1010',E1 1500.0,E2 0.0}";
+    let text = format!("SLIN {target} WITH $TOOL={{X 1,Y 0,Z 0,A 0,B 0,C 0}}, $IPO_MODE=#TCP\nSLIN {target}\n");
+    let external = "E1 is 1500: calib assumed that external axes stand at 0 and do not move the robot";
+    let accurate = "S says that the point was taught at an absolutely accurate robot: calib assumed that the controller's own model of the robot's errors is off";
     assert_eq!(
         warnings(&text),
         [
-            format!("1:1: sets $BASE: {base}"),
-            format!("2:1: sets $TOOL: {tool}"),
-            format!("4:1: sets $TOOL: {tool}"),
-            "5:33: S is not checked: it needs the arm's geometry; targets are reached in the posture that T states".into(),
-            "5:48: E1 is 1500: calib assumed that external axes stand at 0 and do not move the robot".into(),
-            format!("5:68: sets $TOOL: {tool}"),
-            "5:101: sets $IPO_MODE: calib assumed that the robot carries the tool (#BASE)".into(),
-            format!("6:15: sets $BASE: {base}"),
+            "1:9: its $BASE is carried by the robot: the tool stands still ($IPO_MODE #TCP) ($IPO_MODE of line 1)".into(),
+            format!("1:33: {accurate}"),
+            format!("1:49: {external}"),
+            "2:9: no $BASE is set before this target: calib assumed that it stands in the robot's base".into(),
+            format!("2:33: {accurate}"),
+            format!("2:49: {external}"),
         ]
     );
 }
