@@ -67,6 +67,8 @@ pub struct Fitted {
     pub repeated: Option<Repeated>,
     /// Poses whose rows were taken as one by the covariance; 0 where rows were taken as independent.
     pub clusters: usize,
+    /// By what the standard deviations are larger than those of the stated noise.
+    pub noise_scale: f64,
     /// Of the free parameters; `None` where the factor is singular.
     pub covariance: Option<Covariance>,
     /// (name, value, meaning).
@@ -164,9 +166,11 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
     }
     let has_angles = all.residuals.iter().any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
-    let (everything, _) = model.with_priors(candidates, problem.shown(model, candidates).unwrap_or(all.factor));
     let singular = factor.singular_values(&prior(&free));
-    let singular_all = everything.singular_values(&prior(candidates));
+    let singular_all = match problem.shown(model, candidates) {
+        None if free == candidates => singular.clone(),
+        shown => model.with_priors(candidates, shown.unwrap_or(all.factor)).0.singular_values(&prior(candidates)),
+    };
     Fitted {
         statuses,
         course,
@@ -174,6 +178,7 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
         excess_sigma: problem.excess.length,
         excess_sigma_angle: has_angles.then_some(problem.excess.angle),
         values: errors.iter().map(|(_, axes)| axes).sum(),
+        noise_scale: scale,
         covariance,
         prior_checks,
         repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),

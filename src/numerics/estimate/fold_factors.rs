@@ -85,6 +85,20 @@ impl<'a> NearbyFits<'a> {
         Some(self.parts.par_iter().map(|part| self.without(part, &beside, &part.factor.given(steps))).collect())
     }
 
+    /// Values of some of the columns under a fit to all rows, the columns that have a step moved by it and kept, with their standard
+    /// deviations by the stated noise. `None` where the others are not separable.
+    pub fn estimated(&self, steps: &[Option<f64>], of: &[usize]) -> Option<Vec<(f64, f64)>> {
+        let whole = self.whole.given(steps);
+        let (inverse, found) = (whole.inverse()?, whole.solve(0.0)?);
+        let open: Vec<usize> = (0..steps.len()).filter(|j| steps[*j].is_none()).map(|j| self.columns[j]).collect();
+        let one = |parameter: &usize| {
+            let i = open.iter().position(|other| other == parameter)?;
+            let square: f64 = (i..open.len()).map(|j| inverse.at(i, j).powi(2)).sum();
+            Some((self.model.x[*parameter] + found[i], square.sqrt()))
+        };
+        of.iter().map(one).collect()
+    }
+
     fn without(&self, part: &LeftOutRows, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
         let FitOfAll { whole, inverse, model, open } = beside;
         let p = open.len();

@@ -15,7 +15,6 @@ use super::types::{ClosedForm, Finding};
 use crate::effect::{
     DeclaredCause, DeclaredForm, Effect, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people,
 };
-use crate::estimate::ParameterStatus;
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
 use shape_sigma::shape_sigmas;
@@ -63,12 +62,12 @@ impl FormulaSearch<'_, '_> {
             .collect();
         let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
         let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
-        let judge = alternatives.judge()?;
-        let without = judge(&members, None)?.rms();
+        let near = alternatives.near()?;
+        let without = near.errors(&members, None)?.rms();
         let curve = FoldErrors::of(self.state, self.fitter)?.rms();
         let priced = |(k, candidate): (usize, &Candidate)| Priced {
             price: candidate.price,
-            error: judge(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
+            error: near.errors(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
         };
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
         let (shown, chosen) = front(&priced, [without, curve])?;
@@ -80,7 +79,7 @@ impl FormulaSearch<'_, '_> {
             curve,
             without,
             chosen: Some(position) == chosen,
-            numbers: self.numbers(&candidates[*k], &variables, (&members, &beside)),
+            numbers: self.numbers(&candidates[*k], &variables, &beside, near.coefficients(&members, *k)),
         };
         Some(shown.iter().enumerate().map(one).collect())
     }
@@ -149,12 +148,14 @@ impl FormulaSearch<'_, '_> {
         EstimatedCause { form: form.clone(), coefficients: vec![0.0; count], priors: Vec::new() }
     }
 
-    /// Shape numbers, then coefficients as the whole model has them with the formula in place of the curves.
+    /// Shape numbers, then coefficients (SI, with their standard deviations) as the whole model has them with the formula in place of the
+    /// curves.
     fn numbers(
         &self,
         candidate: &Candidate,
         variables: &[NamedVariable],
-        (members, beside): (&[usize], &Beside),
+        beside: &Beside,
+        coefficients: Option<Vec<(f64, f64)>>,
     ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;
         let sigmas = shape_sigmas(form, beside);
@@ -165,17 +166,10 @@ impl FormulaSearch<'_, '_> {
                 ParameterEstimate { unit, name, form: 0, value: scale * value, sigma: sigma.map(|sigma| scale * sigma) }
             })
             .collect();
-        let others = self.state.causes.iter().enumerate().filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone());
-        let fitted = self.fitter.fit(&self.state.model, others.chain([self.at_zero(form)]).collect());
-        let Some(range) = fitted.ranges.last().cloned() else { return out };
-        for (k, number) in range.zip(1..) {
-            let spec = &fitted.model.stack.specs()[k];
+        let specs = form.parameters(&self.state.model.robot);
+        for ((spec, (value, sigma)), number) in specs.iter().zip(coefficients.unwrap_or_default()).zip(1..) {
             let (unit, symbol) = people(spec.unit);
-            let sigma = match fitted.fitted.statuses[k] {
-                ParameterStatus::Free(sigma) => Some(unit.from_si(sigma)),
-                _ => None,
-            };
-            let value = unit.from_si(fitted.model.x[k]);
+            let (value, sigma) = (unit.from_si(value), Some(unit.from_si(sigma)));
             out.push(ParameterEstimate { name: format!("c{number}"), form: 0, value, unit: symbol, sigma });
         }
         out

@@ -27,22 +27,48 @@ impl<'a> Alternatives<'a> {
         Some(Self { state, fitter, model, ranges, folds: folds(state, fitter)? })
     }
 
-    /// What gives the errors of folds without some causes (by their positions), and with a rival (by its own) or none. It gives nothing
-    /// where an alternative is not near the state.
-    pub fn judge(&self) -> Option<impl Fn(&[usize], Option<usize>) -> Option<FoldErrors>> {
+    /// The fits around the state; none where bounds are in the way.
+    pub fn near(&self) -> Option<NearAlternatives<'_>> {
         let Self { state, fitter, model, ranges, folds } = self;
         let session = Session { model, ..state.session(fitter) };
-        let causes = state.causes.len();
         let mut columns = state.fitted.free();
-        columns.extend(ranges[causes..].iter().cloned().flatten());
+        columns.extend(ranges[state.causes.len()..].iter().cloned().flatten());
         let nearby = NearbyFits::of(&session, folds, &columns, fitter.scale)?;
-        Some(move |out: &[usize], rival: Option<usize>| {
-            let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
-            let other = |k: &usize| (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes));
-            let step = |k: &usize| (left_out(k) || other(k)).then_some(-model.x[*k]);
-            let steps: Vec<Option<f64>> = columns.iter().map(step).collect();
-            let errors: Option<Vec<Vec<f64>>> = nearby.with(&steps)?.into_iter().collect();
-            Some(FoldErrors::gathered(&session, folds, &errors?, fitter.scale))
-        })
+        Some(NearAlternatives { of: self, session, columns, nearby })
+    }
+}
+
+/// Fits around a state, in a linear picture.
+pub(crate) struct NearAlternatives<'n> {
+    of: &'n Alternatives<'n>,
+    session: Session<'n>,
+    columns: Vec<usize>,
+    nearby: NearbyFits<'n>,
+}
+
+impl NearAlternatives<'_> {
+    /// Steps of what is left out: some causes (by their positions), and all rivals but one (by its own).
+    fn steps(&self, out: &[usize], rival: Option<usize>) -> Vec<Option<f64>> {
+        let Alternatives { state, model, ranges, .. } = self.of;
+        let causes = state.causes.len();
+        let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
+        let other = |k: &usize| (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes));
+        self.columns.iter().map(|k| (left_out(k) || other(k)).then_some(-model.x[*k])).collect()
+    }
+
+    /// The errors of folds without some causes (by their positions), and with a rival (by its own) or none. Nothing where that is not near
+    /// the state.
+    pub fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
+        let errors: Option<Vec<Vec<f64>>> = self.nearby.with(&self.steps(out, rival))?.into_iter().collect();
+        Some(FoldErrors::gathered(&self.session, &self.of.folds, &errors?, self.of.fitter.scale))
+    }
+
+    /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.
+    pub fn coefficients(&self, out: &[usize], rival: usize) -> Option<Vec<(f64, f64)>> {
+        let Alternatives { state, ranges, .. } = self.of;
+        let own: Vec<usize> = ranges[state.causes.len() + rival].clone().collect();
+        let found = self.nearby.estimated(&self.steps(out, Some(rival)), &own)?;
+        let scale = state.fitted.noise_scale;
+        Some(found.into_iter().map(|(value, sigma)| (value, sigma * scale)).collect())
     }
 }

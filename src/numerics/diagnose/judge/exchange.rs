@@ -146,7 +146,7 @@ impl Contested {
         let fitter = comparison.fitter;
         let causes: Vec<EstimatedCause> = rivals.iter().map(|rival| rival.cause.clone()).collect();
         let Some(alternatives) = Alternatives::of(now, fitter, &causes) else { return Outcome::Unknown };
-        let nearby = alternatives.judge();
+        let nearby = alternatives.near();
         let fitted = |rival: Option<usize>| {
             let rival = rival.map(|k| causes[k].clone());
             let state = fitter.fit(&now.model, others(now, &self.members).into_iter().chain(rival).collect());
@@ -154,7 +154,7 @@ impl Contested {
             Some((Box::new(state), errors))
         };
         let look = |rival: Option<usize>| {
-            let near = nearby.as_ref().and_then(|judge| judge(&self.members, rival));
+            let near = nearby.as_ref().and_then(|near| near.errors(&self.members, rival));
             near.or_else(|| fitted(rival).map(|(_, errors)| errors))
         };
         let Some(bare) = look(None) else { return Outcome::Unknown };

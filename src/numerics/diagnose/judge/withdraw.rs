@@ -44,8 +44,8 @@ fn useless(now: &FitState, comparison: &ModelComparison) -> Option<FitState> {
     }
     let all: Vec<usize> = (0..now.causes.len()).collect();
     let seen = FoldErrors::of(now, comparison.fitter)?;
-    let near = Alternatives::of(now, comparison.fitter, &[])?;
-    let bare = near.judge().and_then(|judge| judge(&all, None));
+    let around = Alternatives::of(now, comparison.fitter, &[])?;
+    let bare = around.near().and_then(|near| near.errors(&all, None));
     if bare.is_some_and(|bare| seen.gain_over(&bare) > 0.0) {
         return None;
     }
@@ -87,8 +87,8 @@ fn harmful(
 ) -> Option<(Vec<usize>, String, FitState)> {
     let fitter = comparison.fitter;
     let seen = FoldErrors::of(now, fitter)?;
-    let near = Alternatives::of(now, fitter, &[])?;
-    let nearby = near.judge();
+    let around = Alternatives::of(now, fitter, &[])?;
+    let nearby = around.near();
     let mut worst: Option<(f64, Vec<usize>, String, FitState)> = None;
     let groups: FindingGroups = groups(now, set, comparison.pool, comparison.survey);
     for ((effect, place), members) in groups {
@@ -98,7 +98,7 @@ fn harmful(
         if known.as_ref().is_some_and(|known| known.gain > 0.0) {
             continue;
         }
-        let bare = nearby.as_ref().and_then(|judge| judge(&members, None));
+        let bare = nearby.as_ref().and_then(|near| near.errors(&members, None));
         let mut gain = bare.map(|bare| seen.gain_over(&bare));
         let mut state = None;
         // What is to go is fitted before it goes.
