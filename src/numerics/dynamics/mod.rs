@@ -9,6 +9,7 @@ mod cases;
 mod cause;
 mod changes;
 mod check;
+mod check_gravity;
 mod choice;
 mod clock;
 mod columns;
