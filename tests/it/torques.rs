@@ -3,6 +3,7 @@
 mod changes;
 mod concealed;
 mod excite;
+mod feed_forward;
 mod hostile;
 mod results;
 mod rigid;
