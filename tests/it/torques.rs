@@ -5,6 +5,7 @@ mod concealed;
 mod excite;
 mod feed_forward;
 mod hostile;
+mod masses;
 mod results;
 mod rigid;
 
