@@ -2,6 +2,7 @@
 
 mod arm;
 mod base_parameters;
+mod bodies;
 mod bootstrap;
 mod bridge;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod consistency;
 mod contact;
 mod cutoff;
 mod derivatives;
+mod enforce;
 mod errors;
 mod excite;
 mod feed_forward;
@@ -54,6 +56,7 @@ mod unseen;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
+pub use bodies::EnforcedBodies;
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
@@ -105,7 +108,7 @@ pub fn diagnose(
     let remarks = check::remarks(&bridged, &clock).into_iter().chain(bridged.remark(recording.rows())).collect();
     let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&bridged.recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
     let solved = solve::solve(arm, &bridged.recording, question, &clock, cutoff, tell);
-    let mut diagnosis = outcome::outcome(&solved, question.seed, remarks);
+    let mut diagnosis = outcome::outcome(&solved, question, remarks);
     diagnosis.courses.row.iter_mut().for_each(|row| *row = bridged.origin[*row]);
     Ok(diagnosis)
 }

@@ -1,5 +1,6 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
+use super::bodies::EnforcedBodies;
 use super::model::TorqueModel;
 use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
@@ -14,6 +15,8 @@ pub struct TorqueQuestion {
     pub cutoff: Option<f64>,
     /// Names of causes that are not tried.
     pub without: Vec<String>,
+    /// Whether the numbers of declared links are moved to the nearest that bodies have.
+    pub enforce_bodies: bool,
     /// Of the bootstrap.
     pub seed: u64,
 }
@@ -237,4 +240,6 @@ pub struct TorqueDiagnosis {
     pub friction: Vec<FrictionCurve>,
     /// All that was identified, as torques are predicted with it.
     pub model: TorqueModel,
+    /// Links whose numbers were moved to those of bodies, where that was asked and any had to be.
+    pub enforced: Option<EnforcedBodies>,
 }
