@@ -4,19 +4,11 @@ use super::enforce::nearest_bodies;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
+use super::types::EnforcedBodies;
 use nalgebra::{DMatrix, DVector};
 
 /// Of the largest: an eigenvalue below it is none.
 const NOTHING: f64 = 1e-13;
-
-/// What was enforced.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EnforcedBodies {
-    /// Links that were no bodies, from 0.
-    pub links: Vec<usize>,
-    /// What the whitened squared residual rises by, tolerances of the declared masses included.
-    pub cost: f64,
-}
 
 /// Coefficients at which all links are bodies, nearest in the metric of their covariance; `None` where they are already, or where no masses
 /// are declared: base parameters are those of many arms.

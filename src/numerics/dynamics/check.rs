@@ -121,7 +121,7 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
     if widest < LEAST_RANGE || 2 * moving < n {
-        let radians = if widest > LEAST_RANGE * DEGREE { "; or radians were taken for degrees" } else { "" };
+        let radians = if widest > LEAST_RANGE * DEGREE { "; or radians were read as degrees" } else { "" };
         faults.push(fault(
             "position",
             format!("the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"),

@@ -56,7 +56,6 @@ mod unseen;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use bodies::EnforcedBodies;
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
@@ -68,8 +67,8 @@ pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use types::{
-    ContactEvent, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueEvidence,
-    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
+    ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
+    TorqueEvidence, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
 };
 
 use crate::error::{Error, Result};

@@ -1,6 +1,6 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
-use super::bodies::{EnforcedBodies, with_bodies};
+use super::bodies::with_bodies;
 use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
@@ -14,8 +14,8 @@ use super::problem::TorqueProblem;
 use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
 use super::types::{
-    InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover, TorqueNoise,
-    TorqueParameter, TorqueQuestion,
+    EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover,
+    TorqueNoise, TorqueParameter, TorqueQuestion,
 };
 use super::unseen::not_observable;
 use crate::diagnose::VerdictKind;

@@ -1,6 +1,5 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
-use super::bodies::EnforcedBodies;
 use super::model::TorqueModel;
 use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
@@ -196,6 +195,15 @@ pub struct TorqueCourses {
     pub simulated: Vec<f64>,
     /// Nm, rows x n: with the findings.
     pub corrected: Vec<f64>,
+}
+
+/// Links that were moved to bodies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnforcedBodies {
+    /// Links that were no bodies, from 0.
+    pub links: Vec<usize>,
+    /// What the whitened squared residual rises by, tolerances of the declared masses included.
+    pub cost: f64,
 }
 
 /// The outcome of a diagnosis of torques.
