@@ -12,8 +12,8 @@ crate::table::rows! { "body_consistency",
         /// One standard deviation.
         sigma_kg_m2: Option<f64>,
         consistent: bool,
-        /// Whether no body had the link's numbers before they were moved to the nearest of bodies.
-        enforced: bool,
+        /// Whether no body had the link's numbers before they were moved to the nearest of bodies; null where nothing was enforced.
+        enforced: Option<bool>,
         /// What the whitened squared residual rose by, all links together; null where nothing was enforced.
         cost: Option<f64>,
     }
@@ -29,7 +29,7 @@ impl BodyConsistencies {
             spread_kg_m2: found.spread,
             sigma_kg_m2: found.sigma,
             consistent: found.is_consistent(),
-            enforced: enforced.is_some_and(|enforced| enforced.links.contains(&found.link)),
+            enforced: enforced.map(|enforced| enforced.links.contains(&found.link)),
             cost: enforced.map(|enforced| enforced.cost),
         };
         Self(diagnosis.model.consistency().into_iter().map(row).collect())

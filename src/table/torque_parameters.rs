@@ -150,10 +150,13 @@ impl TorqueParameters {
     }
 
     fn range(&self, joint: usize) -> Result<JointRange> {
-        let [least, greatest, speed, acceleration, load, misfit, usual] =
-            RANGE.map(|(quantity, _)| self.value(&format!("{SEEN}.j{joint}.{quantity}")));
+        let of = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
+        let [least, greatest, speed, acceleration] = [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of);
+        // Tables of before these were written say nothing of them.
+        let [load, misfit, usual] = [(RANGE[4].0, f64::INFINITY), (RANGE[5].0, 0.0), (RANGE[6].0, 0.0)]
+            .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
         let position = [least?, greatest?];
-        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load: load?, misfit: misfit?, usual: usual? })
+        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load, misfit, usual })
     }
 
     fn temperature(&self) -> Option<[f64; 2]> {
