@@ -47,7 +47,10 @@ use std::path::{Path, PathBuf};
 /// With --torque the targets are a planned motion in even steps of time (time_s, q1_deg .., where given dq1_deg_s .. and ddq1_deg_s2 ..), and
 /// the answer is the torque that each row needs by the model of `diagnose_torques` (tau1_nm .., and i1_a .. where motors are declared), to be
 /// fed forward: masses, friction and all other causes, but for latency and contacts, which belong to the recording. Without dq and ddq
-/// positions are differentiated as those of the recording were. `remark` names rows beyond the recorded positions, speeds and accelerations.
+/// positions are differentiated as those of the recording were. u95_1_nm .. is how far each torque may be off (95 %), by the covariance of the
+/// model and by laws that are used beyond what was recorded; `remark` names rows beyond the recorded positions, speeds, accelerations, loads
+/// and temperatures (column temp_c, or --temperature). A row of which a joint's torque is less certain than --max-uncertainty gets no torques:
+/// their cells are empty, and the command ends with code 10 when all others are written. calib refuses its own output.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CompensateArguments {
@@ -84,8 +87,9 @@ pub(super) struct CompensateArguments {
     /// Largest turn by which a target is corrected, deg
     #[arg(long, value_name = "DEG", default_value_t = 2.0)]
     max_turn: f64,
-    /// Largest uncertainty (95 %) of a target's correction along its direction, mm [default: the size of the correction, or six times what is
-    /// usual at the recorded poses where that is more]
+    /// Largest uncertainty (95 %) of a target's correction along its direction, mm; with --torque of a joint's torque, Nm [default: the size
+    /// of the correction, or six times what is usual at the recorded poses where that is more; the correction of a torque is what it differs
+    /// by from that of the arm as declared]
     #[arg(long, value_name = "MM")]
     max_uncertainty: Option<f64>,
     /// Takes frames of a program that are not applied (work object, $BASE, $TOOL, displacement) as those of the robot file, with a warning
@@ -120,7 +124,7 @@ pub(super) struct CompensateArguments {
     length: Option<String>,
     /// Torques that a planned motion needs, instead of corrected targets
     #[arg(long, conflicts_with_all = ["target", "orientation", "one_step", "plain", "leave_partial", "payload", "max_correction", "max_turn",
-          "max_uncertainty", "assume_frames", "tool", "with", "temperature", "time", "direction", "start", "angle", "length", "no_sigma"])]
+          "assume_frames", "tool", "with", "time", "direction", "start", "angle", "length"])]
     torque: bool,
     /// Seconds from when the arm began to move to the first row, for friction that falls as gears warm up [default: the arm is warm]
     #[arg(long, value_name = "S", requires = "torque")]
@@ -156,7 +160,16 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     identified.spare(arguments.out.as_deref())?;
     if arguments.torque {
         let (motion, out) = (arguments.targets.as_path(), arguments.out.as_deref());
-        let asked = FeedForward { motion, out, since_start: arguments.since_start, quiet: arguments.model.quiet };
+        let asked = FeedForward {
+            motion,
+            out,
+            since_start: arguments.since_start,
+            temperature: arguments.temperature,
+            max_uncertainty: arguments.max_uncertainty,
+            sigma: !arguments.no_sigma,
+            force: arguments.model.force,
+            quiet: arguments.model.quiet,
+        };
         return feed_forward(&asked, &identified);
     }
     if identified.is_of_torques_alone() {

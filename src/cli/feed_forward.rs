@@ -1,18 +1,16 @@
 //! `calib compensate --torque`: the torques that a planned motion needs by the identified model.
 
 use super::emit;
-use crate::dynamics::{JointRange, NeededTorques};
-use crate::error::{Error, Result, counted};
+use crate::dynamics::{JudgedRow, TorqueGate};
+use crate::error::{Error, Fault, Result, counted};
 use crate::identified::{IdentifiedModel, IdentifiedTorques};
 use crate::raw;
 use crate::targets::{Trajectory, unwritten, whole};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// Beyond the greatest speed or acceleration of the recording by more than this share, torques are extrapolated.
-const BEYOND: f64 = 1.02;
-/// rad: the same of positions.
-const ASIDE: f64 = 0.02;
+/// Rows that are told of one file.
+const MOST: usize = 20;
 
 /// What is asked.
 pub(super) struct FeedForward<'a> {
@@ -21,6 +19,13 @@ pub(super) struct FeedForward<'a> {
     pub out: Option<&'a Path>,
     /// s from when the arm began to move; none: it is warm.
     pub since_start: Option<f64>,
+    /// C, where the motion does not say it.
+    pub temperature: Option<f64>,
+    /// Nm, 95 %: the limit of a joint's uncertainty.
+    pub max_uncertainty: Option<f64>,
+    /// Whether uncertainties are written and judged.
+    pub sigma: bool,
+    pub force: bool,
     pub quiet: bool,
 }
 
@@ -31,28 +36,56 @@ pub(super) fn feed_forward(asked: &FeedForward, identified: &IdentifiedModel) ->
         return Err(Error::spec("--torque", message));
     };
     let (place, text) = read(asked.motion)?;
-    let mut trajectory = Trajectory::read(&place, &text, &identified.robot)?;
-    trajectory.motion.since_start = asked.since_start;
-    let needed = torques.model.needed(&torques.arm, &trajectory.motion)?;
-    let remarks = remarks(&torques.model.range, &trajectory.motion.position, &needed);
-    let written = trajectory.written(&needed, torques.per_ampere.as_deref(), &remarks);
+    let mut trajectory = Trajectory::read(&place, &text, &identified.robot, asked.force)?;
+    let motion = &mut trajectory.motion;
+    motion.since_start = asked.since_start;
+    if motion.temperature.is_none() {
+        motion.temperature = asked.temperature.map(|temperature| vec![temperature; motion.time.len()]);
+    }
+    let mut needed = torques.model.needed(&torques.arm, &trajectory.motion)?;
+    if !asked.sigma {
+        needed.u95 = None;
+    }
+    let model = if asked.force { identified.refusals.clone() } else { Vec::new() };
+    let gate = TorqueGate { uncertainty: asked.max_uncertainty, insisted: asked.force, model };
+    let judged = torques.model.judged(&trajectory.motion, &needed, &gate);
+    let written = trajectory.written(&needed, torques.per_ampere.as_deref(), &judged);
     match asked.out {
         Some(out) => whole(out, |mut file| file.write_all(written.as_bytes()).map_err(|error| unwritten(out, &error)))?,
         None => emit(&written)?,
     }
-    let outside = remarks.iter().filter(|remark| !remark.is_empty()).count();
-    let mut told = String::new();
-    if !asked.quiet {
-        told.push_str(&said(torques, &trajectory, remarks.len()));
+    let mut told = if asked.quiet { String::new() } else { said(torques, &trajectory, judged.len()) };
+    if asked.sigma && needed.u95.is_none() {
+        told.push_str("warning: a table of parameters alone does not say how certain torques are: nothing is refused for it\n");
     }
-    if outside > 0 {
-        let rows = counted(remarks.len(), "row");
-        told.push_str(&format!(
-            "warning: {outside} of {rows} lie beyond the motion that the model was seen in (column `remark`)\n"
-        ));
-    }
+    told.push_str(&warnings(&judged));
     let _ = std::io::stderr().write_all(told.as_bytes());
-    Ok(())
+    refused(&judged, &trajectory, &place)
+}
+
+/// What is wrong with some rows, a sentence a line.
+fn warnings(judged: &[JudgedRow]) -> String {
+    let rows = counted(judged.len(), "row");
+    let line = |is: fn(&JudgedRow) -> bool, what: &str| {
+        let count = judged.iter().filter(|row| is(row)).count();
+        if count > 0 { format!("warning: {count} of {rows} {what} (column `remark`)\n") } else { String::new() }
+    };
+    [
+        line(JudgedRow::is_beyond, "lie beyond the motion that the model was seen in"),
+        line(JudgedRow::is_refused, "are less certain than allowed and have no torques; --force writes them all the same"),
+        line(JudgedRow::is_insisted, "are refused and written because of --force"),
+    ]
+    .concat()
+}
+
+/// Fails with the rows that have no torques, the first of them.
+fn refused(judged: &[JudgedRow], trajectory: &Trajectory, place: &str) -> Result<()> {
+    let refused = judged.iter().enumerate().filter(|(_, row)| row.is_refused()).take(MOST);
+    let fault = |(row, judged): (usize, &JudgedRow)| {
+        Fault::new(trajectory.place(row, place), format!("{judged}: no torques are written"))
+    };
+    let faults: Vec<Fault> = refused.map(fault).collect();
+    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
 }
 
 fn read(motion: &Path) -> Result<(String, String)> {
@@ -89,26 +122,4 @@ fn said(torques: &IdentifiedTorques, trajectory: &Trajectory, rows: usize) -> St
         torques.origin,
         counted(rows, "row")
     )
-}
-
-/// Of each row, where it is beyond the recording; empty elsewhere.
-fn remarks(range: &[JointRange], position: &[f64], needed: &NeededTorques) -> Vec<String> {
-    let n = range.len();
-    let of_row = |row: usize| {
-        let mut parts = Vec::new();
-        for (joint, seen) in range.iter().enumerate() {
-            let (at, number) = (n * row + joint, joint + 1);
-            if position[at] < seen.position[0] - ASIDE || position[at] > seen.position[1] + ASIDE {
-                parts.push(format!("joint {number} where it was not recorded"));
-            }
-            if needed.velocity[at].abs() > BEYOND * seen.speed {
-                parts.push(format!("joint {number} faster than recorded"));
-            }
-            if needed.acceleration[at].abs() > BEYOND * seen.acceleration {
-                parts.push(format!("joint {number} accelerates more than recorded"));
-            }
-        }
-        parts.join("; ").replace(',', " ")
-    };
-    (0..position.len() / n).map(of_row).collect()
 }

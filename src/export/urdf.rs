@@ -106,11 +106,16 @@ fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent
     Ok(())
 }
 
-/// Friction, where torques show it.
+/// Friction that torques show; nothing is said of what was not found.
 fn dynamics(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
-    let Some(torques) = &export.identified.torques else { return Ok(()) };
-    let number = |effect| numbers([positive(torques, effect, index).unwrap_or(0.0)]);
-    empty(xml, "dynamics", &[("damping", &number(DAMPING)), ("friction", &number(FRICTION))])
+    let torques = export.identified.torques.as_ref();
+    let number = |(name, effect)| Some((name, numbers([positive(torques?, effect, index)?])));
+    let found: Vec<(&str, String)> = [("damping", DAMPING), ("friction", FRICTION)].into_iter().filter_map(number).collect();
+    if found.is_empty() {
+        return Ok(());
+    }
+    let found: Vec<(&str, &str)> = found.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    empty(xml, "dynamics", &found)
 }
 
 /// Which links a joint connects.

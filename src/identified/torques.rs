@@ -8,7 +8,7 @@ use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{dynamic_arm, torque_per_ampere};
 use crate::store::TableRef;
 use crate::store::frame::Frame;
-use crate::table::{Table, TorqueFindings, TorqueParameters, TorqueVerdict};
+use crate::table::{Table, TorqueCovariance, TorqueFindings, TorqueParameters, TorqueVerdict};
 
 /// The model of torques, and the arm that it is of.
 pub struct IdentifiedTorques {
@@ -66,6 +66,9 @@ impl IdentifiedTorques {
         let Some(stage) = stages.next_back() else { return Ok(None) };
         let Some(parameters) = written::<TorqueParameters>(stage, &load)? else { return Ok(None) };
         let mut own = Self::of(robot, parameters, format!("run {}, stage {}", manifest.run_id, stage.id))?;
+        if let Some(covariance) = written::<TorqueCovariance>(stage, &load)? {
+            own.model.covariance = covariance.of_model(&own.model)?;
+        }
         let findings = written::<TorqueFindings>(stage, &load)?.unwrap_or_default();
         let outside = findings.0.into_iter().filter(|row| OF_THE_RECORDING.contains(&row.effect.as_str()));
         own.of_the_recording = outside.map(|row| row.statement).collect();

@@ -207,7 +207,12 @@ fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
             significant(row.mass_kg, 4),
             significant(row.spread_kg_m2, 3),
             row.sigma_kg_m2.map_or_else(String::new, |sigma| significant(sigma, 2)),
-            if row.consistent { "a body has these numbers" } else { "no body has these numbers" }.into(),
+            match (row.enforced == Some(true), row.consistent) {
+                (true, _) => "no body had these numbers: moved to the nearest body",
+                (false, true) => "a body has these numbers",
+                (false, false) => "no body has these numbers",
+            }
+            .into(),
         ]
     };
     consistency.0.iter().map(row).collect()

@@ -25,6 +25,10 @@ pub struct DiagnoseTorques {
     /// Whether masses are free within their tolerance, or identified without regard to what is declared.
     #[serde(default)]
     pub inertials: InertialSetting,
+    /// Whether it is reported that no body has a link's inertial numbers, or enforced that one has: the numbers move to the nearest of bodies
+    /// in the metric of their covariance, and what that costs is said. Enforcing needs declared masses.
+    #[serde(default)]
+    pub consistency: ConsistencySetting,
     /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from how fast the joints come and go,
     /// from 10 Hz to a tenth of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,6 +59,17 @@ pub enum InertialSetting {
     Declared,
     /// Identified: errors of payload, links and torque constants vanish in them.
     Free,
+}
+
+/// What is done where no body has a link's numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ConsistencySetting {
+    /// The table `consistency` says so.
+    #[default]
+    Report,
+    /// The nearest numbers that bodies have are taken.
+    Enforce,
 }
 
 fn fit() -> Vec<String> {
@@ -92,7 +107,7 @@ writes! {
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -113,6 +128,11 @@ impl Stage for DiagnoseTorques {
         if self.cutoff_hz.is_some_and(|hz| !(hz > 0.0 && hz.is_finite())) {
             faults.push(Fault::new("cutoff_hz", "expected a frequency above 0, Hz"));
         }
+        if self.consistency == ConsistencySetting::Enforce && self.inertials == InertialSetting::Free {
+            let message = "`enforce` needs declared masses: base parameters stand for many arms, of which some are bodies; allowed with \
+                           `inertials: free`: report";
+            faults.push(Fault::new("consistency", message));
+        }
         faults
     }
 
@@ -126,8 +146,18 @@ impl Stage for DiagnoseTorques {
         }
         let held_out = self.held_out(&reads.motion, context)?;
         let (recording, sequence) = torque_recording(reads.motion, &robot, held_out)?;
-        let question =
-            TorqueQuestion { free_inertials: free, cutoff: self.cutoff_hz, without: self.without.clone(), seed: context.seed };
+        let enforce_bodies = self.consistency == ConsistencySetting::Enforce;
+        if enforce_bodies && arm.links.is_none() {
+            let message = "`enforce` needs declared masses, and the robot file lacks some: base parameters stand for many arms";
+            return Err(Error::data("with.consistency", message));
+        }
+        let question = TorqueQuestion {
+            free_inertials: free,
+            cutoff: self.cutoff_hz,
+            without: self.without.clone(),
+            enforce_bodies,
+            seed: context.seed,
+        };
         let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
         diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
         Ok(DiagnoseTorquesWrites {
@@ -140,7 +170,7 @@ impl Stage for DiagnoseTorques {
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
-            consistency: BodyConsistencies::of(&diagnosis.model),
+            consistency: BodyConsistencies::of(&diagnosis),
             parameters: TorqueParameters::of(&diagnosis.model)?,
             covariance: TorqueCovariance::of(&diagnosis.model)?,
         })

@@ -19,6 +19,7 @@ mod identify;
 pub mod ingest;
 mod known_cell;
 pub mod learn;
+mod masses;
 mod misplaced_tool;
 mod named_column;
 mod optimise;
@@ -43,11 +44,14 @@ mod weightless;
 pub use compare::{Compare, CompareReads};
 pub use compare_torques::{CompareTorques, CompareTorquesReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
-pub use diagnose_torques::{DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting};
+pub use diagnose_torques::{
+    ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting,
+};
 pub(crate) use dynamic_arm::{dynamic_arm, torque_per_ampere};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
+pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Accepted, Report, ReportReads};
@@ -355,6 +359,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<Masses>(),
     StageEntry::of::<CompareTorques>(),
     StageEntry::of::<ReportTorques>(),
     StageEntry::of::<Compare>(),

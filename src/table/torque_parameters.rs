@@ -45,13 +45,23 @@ struct TermForm {
 const LINKS: &str = "rigid_body";
 const SEEN: &str = "recording";
 /// Of a joint's range, in the order of [`ends`].
-const RANGE: [(&str, &str); 4] =
-    [("position_least", "rad"), ("position_greatest", "rad"), ("speed_greatest", "rad/s"), ("acceleration_greatest", "rad/s2")];
+const RANGE: [(&str, &str); 7] = [
+    ("position_least", "rad"),
+    ("position_greatest", "rad"),
+    ("speed_greatest", "rad/s"),
+    ("acceleration_greatest", "rad/s2"),
+    ("load_greatest", "Nm"),
+    ("misfit", "Nm"),
+    ("u95_usual", "Nm"),
+];
 /// Of the recording as a whole: width of a sign, latency, cut-off.
 const WHOLE: [(&str, &str); 3] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz")];
 
-fn ends(range: &JointRange) -> [f64; 4] {
-    [range.position[0], range.position[1], range.speed, range.acceleration]
+/// Where it was recorded, C.
+const TEMPERATURE: [&str; 2] = ["temperature_least", "temperature_greatest"];
+
+fn ends(range: &JointRange) -> [f64; 7] {
+    [range.position[0], range.position[1], range.speed, range.acceleration, range.load, range.misfit, range.usual]
 }
 
 fn fault(message: String) -> Error {
@@ -113,6 +123,7 @@ impl TorqueParameters {
             latency: self.value(&format!("{SEEN}.{}", WHOLE[1].0))?,
             cutoff: self.value(&format!("{SEEN}.{}", WHOLE[2].0))?,
             range: (1..=joints).map(|joint| self.range(joint)).collect::<Result<_>>()?,
+            temperature: self.temperature(),
         };
         for row in self.0.iter().filter(|row| row.effect == LINKS) {
             let link = match row.place.parse() {
@@ -139,9 +150,18 @@ impl TorqueParameters {
     }
 
     fn range(&self, joint: usize) -> Result<JointRange> {
-        let [least, greatest, speed, acceleration] =
-            RANGE.map(|(quantity, _)| self.value(&format!("{SEEN}.j{joint}.{quantity}")));
-        Ok(JointRange { position: [least?, greatest?], speed: speed?, acceleration: acceleration? })
+        let of = |quantity: &str| self.value(&format!("{SEEN}.j{joint}.{quantity}"));
+        let [least, greatest, speed, acceleration] = [RANGE[0].0, RANGE[1].0, RANGE[2].0, RANGE[3].0].map(of);
+        // Tables of before these were written say nothing of them.
+        let [load, misfit, usual] = [(RANGE[4].0, f64::INFINITY), (RANGE[5].0, 0.0), (RANGE[6].0, 0.0)]
+            .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
+        let position = [least?, greatest?];
+        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load, misfit, usual })
+    }
+
+    fn temperature(&self) -> Option<[f64; 2]> {
+        let [least, greatest] = TEMPERATURE.map(|quantity| self.value(&format!("{SEEN}.{quantity}")).ok());
+        Some([least?, greatest?])
     }
 }
 
@@ -166,7 +186,10 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         };
         RANGE.iter().zip(ends(range)).map(of).collect::<Vec<_>>()
     });
-    whole.chain(ranges).collect()
+    let temperature = TEMPERATURE.iter().zip(model.temperature.into_iter().flatten());
+    let temperature =
+        temperature.map(|(quantity, value)| row(format!("{SEEN}.{quantity}"), Place::Recording, (quantity, "C"), value));
+    whole.chain(ranges).chain(temperature).collect()
 }
 
 /// A cause from its rows.
@@ -214,5 +237,25 @@ impl TorqueCovariance {
         }
         rows.sort_by(|a, b| (&a.parameter, &a.other).cmp(&(&b.parameter, &b.other)));
         Ok(Self(rows))
+    }
+
+    /// Covariance of a model's numbers in the order of its names, row-major. Fails where a pair is missing or a term has no cause.
+    pub fn of_model(&self, model: &TorqueModel) -> Result<Vec<f64>> {
+        let names = model.names()?;
+        let width = names.len();
+        let places: BTreeMap<&str, usize> = names.iter().enumerate().map(|(place, (name, _))| (name.as_str(), place)).collect();
+        let mut all = vec![f64::NAN; width * width];
+        for row in &self.0 {
+            if let (Some(a), Some(b)) = (places.get(row.parameter.as_str()), places.get(row.other.as_str())) {
+                (all[a * width + b], all[b * width + a]) = (row.covariance, row.covariance);
+            }
+        }
+        match all.iter().position(|value| value.is_nan()) {
+            None => Ok(all),
+            Some(entry) => {
+                let [one, other] = [entry / width, entry % width].map(|place| &names[place].0);
+                Err(Error::data("table torque_covariance", format!("has no covariance of {one} and {other}")))
+            }
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
-use super::fields::fields;
+use super::fields::{TextField, fields};
 use super::text::delimiter;
 use super::{MOST, decimal};
 use crate::description::RobotDescription;
-use crate::dynamics::{NeededTorques, PlannedMotion};
+use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
 use crate::error::{Error, Fault, Result};
 
 /// Of the usual step of the clock: what a step may be off.
@@ -19,6 +19,7 @@ enum MotionColumn {
     Position(usize, f64),
     Velocity(usize, f64),
     Acceleration(usize, f64),
+    Temperature,
 }
 
 /// A file's motion, and its lines.
@@ -35,8 +36,9 @@ pub struct Trajectory<'a> {
 
 impl<'a> Trajectory<'a> {
     /// Reads a motion of a robot; `place` names the text in faults. Fails with columns that are not known or missing, numbers that cannot
-    /// be read, times that do not grow in even steps.
-    pub fn read(place: &str, text: &'a str, robot: &RobotDescription) -> Result<Self> {
+    /// be read, times that do not grow in even steps, and where calib wrote the torques of the text already; `force`: its columns are
+    /// written anew.
+    pub fn read(place: &str, text: &'a str, robot: &RobotDescription, force: bool) -> Result<Self> {
         let text = text.trim_start_matches('\u{feff}');
         let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
         let empty = || Error::data(place, "is empty; expected a header line and a motion");
@@ -44,10 +46,18 @@ impl<'a> Trajectory<'a> {
         let delimiter = delimiter(header);
         let at = |line: usize, message: String| Fault::new(format!("{place}:{line}"), message);
         let names = fields(header, delimiter).map_err(|message| Error::Data(vec![at(number, message)]))?;
-        let names: Vec<String> = names.into_iter().map(|field| field.1.into_owned()).collect();
+        let everything = names.len();
+        let kept = kept(place, &names, robot.joints.len(), force)?;
+        let header = kept.checked_sub(1).map_or(header, |last| &header[..names[last].0.end]);
+        let names: Vec<String> = names.into_iter().take(kept).map(|field| field.1.into_owned()).collect();
         let columns = columns(place, &names, robot)?;
         let mut trajectory =
             Self { motion: empty_motion(robot.joints.len(), &columns), header, lines: lines.collect(), delimiter, point: '.' };
+        for (_, line) in &mut trajectory.lines {
+            // What cannot be split is told where the line is read.
+            let end = fields(line, delimiter).ok().and_then(|cells| cells.get(kept.checked_sub(1)?).map(|cell| cell.0.end));
+            *line = end.filter(|_| kept < everything).map_or(*line, |end| &line[..end]);
+        }
         trajectory.fill(place, &columns)?;
         trajectory.check_clock(place)?;
         Ok(trajectory)
@@ -60,6 +70,7 @@ impl<'a> Trajectory<'a> {
         for list in [&mut self.motion.velocity, &mut self.motion.acceleration].into_iter().flatten() {
             list.resize(n * rows, 0.0);
         }
+        self.motion.temperature.iter_mut().for_each(|list| list.resize(rows, 0.0));
         self.motion.time.resize(rows, 0.0);
         self.motion.position.resize(n * rows, 0.0);
         for row in 0..rows {
@@ -115,33 +126,72 @@ impl<'a> Trajectory<'a> {
         Ok(())
     }
 
-    /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, and a remark for each row.
-    pub fn written(&self, needed: &NeededTorques, per_ampere: Option<&[f64]>, remarks: &[String]) -> String {
+    /// The lines with torques (Nm), currents (A) where `per_ampere` says what an ampere is, uncertainties (Nm) where they are known, and
+    /// the remarks of each row; a row that is refused has no torques.
+    pub fn written(&self, needed: &NeededTorques, per_ampere: Option<&[f64]>, rows: &[JudgedRow]) -> String {
         let n = self.motion.joints;
         let (between, point) = (self.delimiter, self.point);
         let mut text = self.header.trim_end().to_string();
-        (1..=n).for_each(|joint| text.push_str(&format!("{between}tau{joint}_nm")));
-        if per_ampere.is_some() {
-            (1..=n).for_each(|joint| text.push_str(&format!("{between}i{joint}_a")));
-        }
-        text.push_str(&format!("{between}remark\n"));
-        for (row, (_, line)) in self.lines.iter().enumerate() {
-            text.push_str(line.trim_end());
-            let own = &needed.torque[n * row..n * (row + 1)];
-            let mut number = |value: f64| {
-                text.push(between);
-                decimal::push(&mut text, value, DECIMALS, point);
-            };
-            own.iter().for_each(|torque| number(*torque));
-            if let Some(per_ampere) = per_ampere {
-                own.iter().zip(per_ampere).for_each(|(torque, factor)| number(torque / factor));
-            }
+        for name in appended(n, per_ampere.is_some(), needed.u95.is_some()) {
             text.push(between);
-            text.push_str(&remarks[row]);
-            text.push('\n');
+            text.push_str(&name);
+        }
+        text.push('\n');
+        for (row, ((_, line), judged)) in self.lines.iter().zip(rows).enumerate() {
+            text.push_str(line.trim_end());
+            let own = n * row..n * (row + 1);
+            let mut number = |value: Option<f64>| {
+                text.push(between);
+                if let Some(value) = value {
+                    decimal::push(&mut text, value, DECIMALS, point);
+                }
+            };
+            let allowed = |value: f64| (!judged.is_refused()).then_some(value);
+            needed.torque[own.clone()].iter().for_each(|torque| number(allowed(*torque)));
+            for factors in per_ampere.into_iter() {
+                needed.torque[own.clone()].iter().zip(factors).for_each(|(torque, factor)| number(allowed(torque / factor)));
+            }
+            needed.u95.iter().flat_map(|all| &all[own.clone()]).for_each(|u95| number(Some(*u95)));
+            let remark = judged.to_string();
+            let quote = if remark.contains(between) { "\"" } else { "" };
+            text.push(between);
+            text.extend([quote, &remark, quote, "\n"]);
         }
         text
     }
+
+    /// The place of a row in its text.
+    pub fn place(&self, row: usize, file: &str) -> String {
+        format!("{file}:{}", self.lines[row].0)
+    }
+}
+
+/// Names of the columns that are appended.
+fn appended(joints: usize, currents: bool, u95: bool) -> impl Iterator<Item = String> {
+    let each = move |wanted: bool, name: fn(usize) -> String| (1..=joints).filter(move |_| wanted).map(name);
+    each(true, |joint| format!("tau{joint}_nm"))
+        .chain(each(currents, |joint| format!("i{joint}_a")))
+        .chain(each(u95, |joint| format!("u95_{joint}_nm")))
+        .chain(std::iter::once("remark".into()))
+}
+
+/// How many columns are the person's own: all, or those before the ones that calib appended. Fails where there are such, unless `force`.
+fn kept(place: &str, names: &[TextField], joints: usize, force: bool) -> Result<usize> {
+    let is = |at: usize, name: &str| names.get(at).is_some_and(|field| field.1 == name);
+    let Some(first) = (0..names.len()).find(|at| is(*at, "tau1_nm")) else { return Ok(names.len()) };
+    let ours = |currents: bool, u95: bool| {
+        let all: Vec<String> = appended(joints, currents, u95).collect();
+        first + all.len() == names.len() && all.iter().enumerate().all(|(k, name)| is(first + k, name))
+    };
+    let written = [(true, true), (true, false), (false, true), (false, false)].into_iter().any(|(i, u)| ours(i, u));
+    if !written {
+        return Ok(names.len());
+    }
+    if !force {
+        let message = "carries the torques that calib wrote already (columns tau1_nm to remark): fed in again, a reader may add them twice. Take the motion of before, or insist with --force, which writes these columns anew";
+        return Err(Error::data(place, message));
+    }
+    Ok(first)
 }
 
 /// What only `dq` and `ddq` of all joints make.
@@ -153,6 +203,7 @@ fn empty_motion(joints: usize, columns: &[MotionColumn]) -> PlannedMotion {
         position: Vec::new(),
         velocity: has(|column| matches!(column, MotionColumn::Velocity(..))),
         acceleration: has(|column| matches!(column, MotionColumn::Acceleration(..))),
+        temperature: has(|column| matches!(column, MotionColumn::Temperature)),
         since_start: None,
     }
 }
@@ -162,6 +213,7 @@ fn put(motion: &mut PlannedMotion, row: usize, column: MotionColumn, value: f64)
     let n = motion.joints;
     let (list, joint, unit) = match column {
         MotionColumn::Time(unit) => return motion.time[row] = unit * value,
+        MotionColumn::Temperature => return motion.temperature.iter_mut().for_each(|all| all[row] = value),
         MotionColumn::Position(joint, unit) => (Some(&mut motion.position), joint, unit),
         MotionColumn::Velocity(joint, unit) => (motion.velocity.as_mut(), joint, unit),
         MotionColumn::Acceleration(joint, unit) => (motion.acceleration.as_mut(), joint, unit),
@@ -197,7 +249,7 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
                 place,
                 format!(
                     "unknown column `{name}`; allowed: time_s or time_ms, q1_deg to q{n}_deg or _rad (or the robot's joint names), \
-                     dq1_deg_s or _rad_s, ddq1_deg_s2 or _rad_s2"
+                     dq1_deg_s or _rad_s, ddq1_deg_s2 or _rad_s2, temp_c"
                 ),
             )),
         }
@@ -220,9 +272,9 @@ fn columns(place: &str, names: &[String], robot: &RobotDescription) -> Result<Ve
 }
 
 fn same(a: &MotionColumn, b: &MotionColumn) -> bool {
-    use MotionColumn::{Acceleration, Position, Time, Velocity};
+    use MotionColumn::{Acceleration, Position, Temperature, Time, Velocity};
     match (a, b) {
-        (Time(_), Time(_)) => true,
+        (Time(_), Time(_)) | (Temperature, Temperature) => true,
         (Position(a, _), Position(b, _)) | (Velocity(a, _), Velocity(b, _)) | (Acceleration(a, _), Acceleration(b, _)) => a == b,
         _ => false,
     }
@@ -232,6 +284,9 @@ fn column(name: &str, robot: &RobotDescription) -> Option<MotionColumn> {
     let lower = name.trim().to_lowercase();
     if let Some((_, unit)) = TIMES.iter().find(|(known, _)| *known == lower) {
         return Some(MotionColumn::Time(*unit));
+    }
+    if lower == "temp_c" {
+        return Some(MotionColumn::Temperature);
     }
     for (what, ending, unit) in PER_JOINT {
         let Some(stem) = lower.strip_suffix(ending) else { continue };

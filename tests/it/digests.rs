@@ -52,6 +52,7 @@ const TRIALS: &[(&str, &str, &str)] = &[
     ("diagnose", "points", "{on: [fit]}"),
     ("ingest_torques", "torques", ""),
     ("diagnose_torques", "torques", "{}"),
+    ("masses", "torques", "{}"),
     ("compare_torques", "torques", "{}"),
     ("report_torques", "torques", "{}"),
     ("compare", "points", "{previous_parameters: parameters.parquet, previous_recording: recording.parquet}"),

@@ -3,7 +3,9 @@
 mod changes;
 mod concealed;
 mod excite;
+mod feed_forward;
 mod hostile;
+mod masses;
 mod results;
 mod rigid;
 

@@ -1,11 +1,18 @@
 #!/usr/bin/env python3
-"""Torques of rigid arms by MuJoCo and by Pinocchio, for the test that holds calib's inverse dynamics and the twin's against them.
+"""Torques of rigid arms by MuJoCo and by Pinocchio, for the test that holds calib's inverse dynamics, its regressor and the twin's
+inverse dynamics against them.
 
-  pip install mujoco pin numpy
+  pip install mujoco==4.0.0 pin==4.1.0 numpy
   mujoco_dynamics.py > tests/it/torques/rigid_arms.json
 
 Three arms drawn at random (5, 6 and 7 turning joints, no two axes alike), ten motions each. Every body has a full inertia. Stops where
 the two engines differ by more than 1e-9 of the largest torque. Numbers are SI, base frame at zero pose; inertias about the centre.
+
+Of two motions of each arm also the columns of the regressor: torques (Nm) at the joints up to a link per unit of each of the link's ten
+numbers (mass, mass times centre from the joint's point, inertia about that point: xx xy xz yy yz zz). Pinocchio's are those of its own
+`computeJointTorqueRegressor`. MuJoCo has no regressor and takes only bodies that exist: one link after the other gets eleven bodies whose
+numbers are independent, and the ten columns are what their torques differ by, solved for the numbers. Written as
+[link][number][joint up to the link].
 """
 
 import json
@@ -70,25 +77,61 @@ def by_pinocchio(links):
         before = link["point"]
         model.appendBodyToJoint(parent, pin.Inertia(link["mass"], link["centre"] - link["point"], link["inertia"]), pin.SE3.Identity())
     data = model.createData()
-    return lambda q, v, a: pin.rnea(model, data, q, v, a).copy()
+    return model, lambda q, v, a: pin.rnea(model, data, q, v, a).copy()
+
+
+def ten(link):
+    """Mass, first moment and inertia about the joint's point."""
+    r, m = link["centre"] - link["point"], link["mass"]
+    return np.array([m, *(m * r), *six(link["inertia"] + m * (r @ r * np.eye(3) - np.outer(r, r)))])
+
+
+def columns_by_mujoco(rng, links, motion):
+    """Columns of each link, and by how much their solution leaves the torques unexplained (Nm)."""
+    columns, left = [], 0.0
+    for k, link in enumerate(links):
+        bodies = [link] + [{**drawn(rng, 1)[0], "axis": link["axis"], "point": link["point"]} for _ in range(14)]
+        for body in bodies[1:]:
+            body["centre"] = link["point"] + rng.uniform(-0.4, 0.4, 3)
+        torques = np.array([by_mujoco(links[:k] + [body] + links[k + 1:])(*motion) for body in bodies])
+        numbers = np.array([ten(body) for body in bodies])
+        change, effect = numbers[1:] - numbers[0], torques[1:] - torques[0]
+        own = np.linalg.lstsq(change, effect, rcond=None)[0]
+        left = max(left, np.abs(change @ own - effect).max())
+        columns.append(own[:, :k + 1])
+    return columns, left
+
+
+def columns_by_pinocchio(model, motion):
+    whole = pin.computeJointTorqueRegressor(model, model.createData(), *motion)
+    order = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # Pinocchio counts xx xy yy xz yz zz.
+    return [whole[:k + 1, 10 * k:10 * k + 10].T[order] for k in range(model.nv)]
 
 
 def main():
     rng, arms = np.random.default_rng(20), []
     for n in (5, 6, 7):
         links = drawn(rng, n)
-        mujoco_torque, pinocchio_torque = by_mujoco(links), by_pinocchio(links)
-        rows = []
-        for _ in range(10):
+        mujoco_torque, (model, pinocchio_torque) = by_mujoco(links), by_pinocchio(links)
+        rows, columns = [], []
+        for number in range(10):
             q, v, a = rng.uniform(-3, 3, n), rng.uniform(-2, 2, n), rng.uniform(-5, 5, n)
             one, other = mujoco_torque(q, v, a), pinocchio_torque(q, v, a)
             off = np.abs(one - other).max() / np.abs(one).max()
             if off > 1e-9:
                 sys.exit(f"{n} joints: MuJoCo and Pinocchio differ by {off:.1e}")
+            if number < 2:
+                own, left = columns_by_mujoco(np.random.default_rng(n), links, (q, v, a))
+                direct = columns_by_pinocchio(model, (q, v, a))
+                off = max(np.abs(x - y).max() for x, y in zip(own, direct))
+                print(f"{n} joints, motion {number + 1}: columns of the engines differ by {off:.1e} Nm, bodies by {left:.1e} Nm", file=sys.stderr)
+                if off > 1e-9:
+                    sys.exit("columns of MuJoCo and Pinocchio differ by more than 1e-9 Nm")
+                columns.append({"mujoco": [c.tolist() for c in own], "pinocchio": [c.tolist() for c in direct]})
             rows.append({"q": list(q), "v": list(v), "a": list(a), "mujoco": list(one), "pinocchio": list(other)})
         told = [{"axis": list(k["axis"]), "point": list(k["point"]), "mass": k["mass"], "centre": list(k["centre"]),
                  "inertia": six(k["inertia"])} for k in links]
-        arms.append({"gravity": list(GRAVITY), "links": told, "rows": rows})
+        arms.append({"gravity": list(GRAVITY), "links": told, "rows": rows, "columns": columns})
     versions = f"MuJoCo {mujoco.__version__}, Pinocchio {pin.__version__}"
     json.dump({"made_by": f"tests/reference/mujoco_dynamics.py, {versions}", "arms": arms}, sys.stdout)
     print()

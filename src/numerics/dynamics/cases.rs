@@ -48,7 +48,7 @@ fn moved(joint: usize, time: f64) -> (f64, f64, f64) {
 type Row = (usize, f64, f64, f64, f64, f64);
 
 /// A recording of `real` with a torque added at each joint; torques come `latency` s late.
-fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
+pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
     let n = real.joints();
     let theta = inertials::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
     let mut dynamics = InverseDynamics::new(real);

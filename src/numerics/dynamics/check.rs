@@ -2,17 +2,23 @@
 
 use super::arm::DynamicArm;
 use super::bridge::Bridged;
+use super::check_gravity::gravity_faults;
 use super::clock::RecordingClock;
-use super::inertials::DeclaredInertials;
-use super::newton_euler::{InverseDynamics, MotionRow};
 use super::recording::TorqueRecording;
 use crate::error::{Error, Fault, Result};
 use crate::statistics::nearest;
 
 /// Rows, at least.
 const FEWEST: usize = 200;
+/// s from row to row: more shows no motion, less is no controller's.
+const SLOWEST: f64 = 0.2;
+const FASTEST: f64 = 2e-5;
 /// rad: the widest range that a joint turns through.
 const WIDEST: f64 = 50.0;
+/// rad: few joints turn farther, and not most of an arm's.
+const TWO_TURNS: f64 = 4.0 * std::f64::consts::PI + 0.5;
+/// rad.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// rad: the arm must move over so much at one joint at least, and at half of them over a fifth of it.
 const LEAST_RANGE: f64 = 0.1;
 /// m: points of an arm are nearer to the base.
@@ -21,14 +27,8 @@ const FARTHEST: f64 = 50.0;
 const SATURATED: f64 = 0.02;
 /// Rows at least of those.
 const SATURATED_ROWS: usize = 40;
-/// Of torque measured over simulated: beyond it, or below its inverse, a unit is wrong.
-const UNIT_RATIO: f64 = 50.0;
-/// Of the squared error with joints exchanged over that without.
-const EXCHANGED: f64 = 0.2;
 /// Of the correlation of recorded and differentiated velocity.
 const SAME_VELOCITY: f64 = 0.5;
-/// Nm: below it gravity shows nothing of units.
-const SMALL_TORQUE: f64 = 1e-3;
 
 /// All faults of sizes and numbers.
 pub(super) fn check(arm: &DynamicArm, recording: &TorqueRecording) -> Result<()> {
@@ -99,6 +99,15 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
             return faults;
         }
     }
+    let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual = nearest(&mut steps, 0.5).unwrap_or(0.0);
+    if usual > SLOWEST || usual < FASTEST {
+        let [most, least] = [1.0 / SLOWEST, 1.0 / FASTEST];
+        let message =
+            format!("rows come at {:.3} Hz, {most:.0} to {least:.0} Hz are allowed: times are in s (milliseconds?)", 1.0 / usual);
+        faults.push(fault("time", message));
+        return faults;
+    }
     if recording.held_out.iter().all(|held| *held) {
         faults.push(fault("held_out", "all rows are held out; some must be fitted"));
     }
@@ -112,13 +121,21 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
     if widest < LEAST_RANGE || 2 * moving < n {
+        let radians = if widest > LEAST_RANGE * DEGREE { "; or radians were read as degrees" } else { "" };
         faults.push(fault(
             "position",
-            format!("the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad"),
+            format!("the arm hardly moves (its widest joint over {widest:.3} rad, {moving} of {n} joints at all): masses and friction cannot be seen; at least half of the joints must move, one over {LEAST_RANGE} rad{radians}"),
+        ));
+    }
+    let turned = ranges.iter().zip(&arm.prismatic).filter(|(range, slides)| **range > TWO_TURNS && !**slides).count();
+    if faults.is_empty() && 2 * turned > n {
+        faults.push(fault(
+            "position",
+            format!("{turned} of {n} joints turn over more than two turns (the widest over {widest:.0} rad): angles are in rad (degrees?)"),
         ));
     }
     if faults.is_empty() {
-        faults.extend(torque_faults(arm, recording));
+        faults.extend(gravity_faults(arm, recording));
     }
     faults
 }
@@ -182,55 +199,6 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
             format!("recorded velocities are {ratio:.3} times those of the positions (correlation {correlation:.2}): another unit, joint or sign"),
         )
     })
-}
-
-/// Torques beside those of the declared arm standing still: units, signs, joints.
-fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
-    let Some(links) = &arm.links else { return Vec::new() };
-    let (n, theta) = (recording.joints, DeclaredInertials::of(arm, links).theta);
-    let mut dynamics = InverseDynamics::new(arm);
-    let (still, mut gravity) = (vec![0.0; n], vec![0.0; n]);
-    let (mut measured_square, mut gravity_square) = (vec![0.0; n], vec![0.0; n]);
-    let mut products = vec![vec![0.0; n]; n];
-    for row in 0..recording.rows() {
-        let position = &recording.position[row * n..(row + 1) * n];
-        dynamics.torque(MotionRow { position, velocity: &still, acceleration: &still }, &arm.gravity, &theta, &mut gravity);
-        for joint in 0..n {
-            let torque = recording.torque[row * n + joint];
-            measured_square[joint] += torque * torque;
-            gravity_square[joint] += gravity[joint] * gravity[joint];
-            gravity.iter().enumerate().for_each(|(other, value)| products[joint][other] += torque * value);
-        }
-    }
-    let weighty: Vec<usize> =
-        (0..n).filter(|joint| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE).collect();
-    let mut ratios: Vec<f64> = weighty.iter().map(|joint| (measured_square[*joint] / gravity_square[*joint]).sqrt()).collect();
-    let mut faults = Vec::new();
-    let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
-    if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
-        let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
-        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&own) {
-            faults.push(fault(
-                "torque",
-                format!("torques are {own:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or torque constant is wrong (by 1,000?)", heaviest + 1),
-            ));
-            return faults;
-        }
-    }
-    let left = |joint: usize, other: usize| measured_square[joint] - 2.0 * products[joint][other] + gravity_square[other];
-    for (place, joint) in weighty.iter().enumerate() {
-        if products[*joint][*joint] < -0.8 * (measured_square[*joint] * gravity_square[*joint]).sqrt() {
-            faults.push(fault(format!("joint {}", joint + 1), "torques are those of the declared masses with the other sign"));
-        }
-        for other in &weighty[place + 1..] {
-            let straight = left(*joint, *joint) + left(*other, *other);
-            if left(*joint, *other) + left(*other, *joint) < EXCHANGED * straight {
-                faults
-                    .push(fault("torque", format!("the columns of joint {} and joint {} look exchanged", joint + 1, other + 1)));
-            }
-        }
-    }
-    faults
 }
 
 /// What is odd about a recording that can be used, a sentence each.

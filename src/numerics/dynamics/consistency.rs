@@ -87,7 +87,7 @@ impl TorqueModel {
 }
 
 /// The body nearest to numbers with a mass, and whether it is theirs.
-fn nearest(ten: &[f64]) -> (Inertial, bool) {
+pub(super) fn nearest(ten: &[f64]) -> (Inertial, bool) {
     let body = body_of(ten);
     let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia).symmetric_eigen();
     if moments.eigenvalues.min() >= 0.0 {

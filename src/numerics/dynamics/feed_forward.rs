@@ -1,6 +1,7 @@
 //! Torques that a planned motion needs, by the identified model: differentiated and composed as the recording was.
 
 use super::arm::DynamicArm;
+use super::cause::TorqueForm;
 use super::clock::RecordingClock;
 use super::model::TorqueModel;
 use super::recording::TorqueRecording;
@@ -23,6 +24,8 @@ pub struct PlannedMotion {
     pub velocity: Option<Vec<f64>>,
     /// rad/s^2. `None`: found from positions.
     pub acceleration: Option<Vec<f64>>,
+    /// C, length rows. `None`: not known.
+    pub temperature: Option<Vec<f64>>,
     /// s from when the arm began to move to the first row, for friction that falls as gears warm up. `None`: the arm is warm.
     pub since_start: Option<f64>,
 }
@@ -32,10 +35,27 @@ pub struct PlannedMotion {
 pub struct NeededTorques {
     /// Nm at the joints, as the drives or sensors of the recording state it.
     pub torque: Vec<f64>,
+    /// Nm of the rigid arm as identified.
+    pub load: Vec<f64>,
+    /// Nm by which `torque` differs from that of the arm as declared; all of it where no masses are declared.
+    pub correction: Vec<f64>,
+    /// Nm, 95 %: by the model's covariance, and by laws that are used beyond the motion of the recording. `None` where the model
+    /// carries no covariance.
+    pub u95: Option<Vec<f64>>,
     /// rad/s.
     pub velocity: Vec<f64>,
     /// rad/s^2.
     pub acceleration: Vec<f64>,
+}
+
+/// What a coefficient of a model adds at a joint, Nm per unit, a value a row.
+pub(super) struct TermCourse {
+    /// Term of the model.
+    pub term: usize,
+    /// Among all coefficients of the model.
+    pub coefficient: usize,
+    pub joint: usize,
+    pub course: Vec<f64>,
 }
 
 impl TorqueModel {
@@ -52,25 +72,53 @@ impl TorqueModel {
         if rows < LEAST {
             return Err(Error::data("motion", format!("has {rows} rows; at least {LEAST} are needed")));
         }
+        let forms = self.terms.iter().map(|term| term.form()).collect::<Result<Vec<TorqueForm>>>()?;
         let mut scene = self.scene(arm, motion);
+        let declared = match &scene.declared {
+            Some(declared) => scene.torques_of(&declared.theta),
+            None => vec![vec![0.0; rows]; n],
+        };
         scene.believe(&self.inertials);
+        let courses = self.courses(&forms, &scene);
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
-        let mut course = vec![0.0; rows];
-        for term in &self.terms {
-            let form = term.form()?;
-            for joint in form.cause.acts_on(&form, n) {
-                for (number, coefficient) in term.coefficients.iter().enumerate() {
-                    form.cause.write(&form, &scene, joint, number, &mut course);
-                    torque[joint].iter_mut().zip(&course).for_each(|(sum, part)| *sum += coefficient * part);
-                }
-            }
+        for one in &courses {
+            let value = self.coefficient(one);
+            torque[one.joint].iter_mut().zip(&one.course).for_each(|(sum, part)| *sum += value * part);
         }
+        let differences = torque.iter().zip(&declared).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect());
+        let correction: Vec<Vec<f64>> = differences.collect();
         let by_row = |courses: &[Vec<f64>]| (0..rows).flat_map(|row| courses.iter().map(move |course| course[row])).collect();
         Ok(NeededTorques {
+            u95: self.uncertainty(&forms, &scene, &courses),
             torque: by_row(&torque),
+            load: by_row(&scene.rigid),
+            correction: by_row(&correction),
             velocity: by_row(&scene.velocity),
             acceleration: by_row(&scene.acceleration),
         })
+    }
+
+    /// What each coefficient adds, term after term.
+    fn courses(&self, forms: &[TorqueForm], scene: &DynamicScene) -> Vec<TermCourse> {
+        let mut courses = Vec::new();
+        let mut first = 0;
+        for (term, form) in forms.iter().enumerate() {
+            for joint in form.cause.acts_on(form, self.joints()) {
+                for number in 0..form.width {
+                    let mut course = vec![0.0; scene.rows()];
+                    form.cause.write(form, scene, joint, number, &mut course);
+                    courses.push(TermCourse { term, coefficient: first + number, joint, course });
+                }
+            }
+            first += form.width;
+        }
+        courses
+    }
+
+    /// Value of a coefficient.
+    pub(super) fn coefficient(&self, of: &TermCourse) -> f64 {
+        let before: usize = self.terms[..of.term].iter().map(|term| term.coefficients.len()).sum();
+        self.terms[of.term].coefficients[of.coefficient - before]
     }
 
     /// The motion as causes see it.

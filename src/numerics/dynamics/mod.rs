@@ -2,6 +2,7 @@
 
 mod arm;
 mod base_parameters;
+mod bodies;
 mod bootstrap;
 mod bridge;
 #[cfg(test)]
@@ -9,6 +10,7 @@ mod cases;
 mod cause;
 mod changes;
 mod check;
+mod check_gravity;
 mod choice;
 mod clock;
 mod columns;
@@ -16,9 +18,12 @@ mod consistency;
 mod contact;
 mod cutoff;
 mod derivatives;
+mod enforce;
 mod errors;
 mod excite;
 mod feed_forward;
+mod feed_gate;
+mod feed_uncertainty;
 mod filter;
 mod findings;
 mod friction_curve;
@@ -27,6 +32,7 @@ mod inertials;
 mod judge;
 mod latency;
 mod leftover;
+mod masses;
 mod model;
 mod modelled;
 mod newton_euler;
@@ -54,13 +60,15 @@ pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
 pub use feed_forward::{NeededTorques, PlannedMotion};
+pub use feed_gate::{JudgedRow, TorqueGate, TorqueRemark};
 pub use inertial_names::INERTIAL_NAMES;
+pub use masses::LinkFromTorques;
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
 pub use types::{
-    ContactEvent, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueEvidence,
-    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
+    ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
+    TorqueEvidence, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
 };
 
 use crate::error::{Error, Result};
@@ -99,7 +107,7 @@ pub fn diagnose(
     let remarks = check::remarks(&bridged, &clock).into_iter().chain(bridged.remark(recording.rows())).collect();
     let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&bridged.recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
     let solved = solve::solve(arm, &bridged.recording, question, &clock, cutoff, tell);
-    let mut diagnosis = outcome::outcome(&solved, question.seed, remarks);
+    let mut diagnosis = outcome::outcome(&solved, question, remarks);
     diagnosis.courses.row.iter_mut().for_each(|row| *row = bridged.origin[*row]);
     Ok(diagnosis)
 }

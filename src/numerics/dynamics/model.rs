@@ -20,7 +20,7 @@ pub struct TorqueTerm {
     pub rms: f64,
 }
 
-/// Positions, speed and acceleration of a joint in the judged rows.
+/// What the judged rows visited at a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRange {
     /// Least and greatest, rad.
@@ -29,6 +29,12 @@ pub struct JointRange {
     pub speed: f64,
     /// rad/s^2.
     pub acceleration: f64,
+    /// Nm, of the rigid arm.
+    pub load: f64,
+    /// Nm, one standard deviation: what held-out rows leave beyond noise and the covariance of the model's numbers.
+    pub misfit: f64,
+    /// Nm, 95 %: what is usual for the model's torque there, by the covariance and the misfit.
+    pub usual: f64,
 }
 
 /// The identified model of an arm's torques.
@@ -50,6 +56,8 @@ pub struct TorqueModel {
     pub cutoff: f64,
     /// Per joint.
     pub range: Vec<JointRange>,
+    /// Least and greatest of the recording, C; `None` where it was not recorded.
+    pub temperature: Option<[f64; 2]>,
 }
 
 impl TorqueModel {

@@ -5,6 +5,12 @@ use super::model::{JointRange, TorqueModel, TorqueTerm};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
+use crate::statistics::nearest;
+
+/// 95 % of a normal distribution lie within so many standard deviations.
+pub(super) const COVERAGE: f64 = 1.96;
+/// Judged rows at which the usual uncertainty is asked, at most.
+const ASKED: usize = 300;
 
 impl TorqueModel {
     /// Of a judged set.
@@ -30,6 +36,7 @@ impl TorqueModel {
         let (identified, covariance) = covariance(problem, set, &adding, sweep);
         let mut inertials = problem.inertials(set, solution);
         inertials.iter_mut().zip(&identified).filter(|(_, known)| !**known).for_each(|(number, _)| *number = 0.0);
+        let certainty = certainty(problem, set, sweep, solution);
         Self {
             inertials,
             identified,
@@ -38,7 +45,12 @@ impl TorqueModel {
             sign_width: problem.scene.sign_width,
             latency: problem.latency,
             cutoff: problem.reduction.cutoff,
-            range: (0..problem.joints()).map(|joint| range(problem, joint)).collect(),
+            range: certainty
+                .into_iter()
+                .enumerate()
+                .map(|(joint, [misfit, usual])| range(problem, joint, misfit, usual))
+                .collect(),
+            temperature: problem.temperature,
         }
     }
 }
@@ -51,7 +63,40 @@ fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
     (acting.into_iter().flatten().map(|value| value * value).sum::<f64>() / count).sqrt()
 }
 
-fn range(problem: &TorqueProblem, joint: usize) -> JointRange {
+/// Of each joint, Nm: what held-out rows (fitted ones where none are) leave beyond noise and the covariance of the numbers, one standard
+/// deviation, and the median of the torque's uncertainty (95 %).
+fn certainty(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Vec<[f64; 2]> {
+    let columns: Vec<usize> = (0..problem.all.base).chain(set.iter().flat_map(|number| problem.all.of(*number))).collect();
+    let (all, width) = (sweep.covariance(&columns), columns.len());
+    let residual = problem.residual(solution);
+    let held: Vec<usize> = problem.runs(true).into_iter().flatten().collect();
+    let rows = if held.is_empty() { problem.runs(false).into_iter().flatten().collect() } else { held };
+    let of = |joint: usize| {
+        let course = |(place, column): (usize, &usize)| {
+            let column = &problem.all.columns[*column];
+            let own = column.joints.iter().position(|one| *one == joint)?;
+            Some((place, column.courses[own].as_slice()))
+        };
+        let acting: Vec<(usize, &[f64])> = columns.iter().enumerate().filter_map(course).collect();
+        let variance = |row: &usize| {
+            let each = |(a, first): &(usize, &[f64])| {
+                let with = acting.iter().map(|(b, second)| all[a * width + b] * second[*row]).sum::<f64>();
+                first[*row] * with
+            };
+            acting.iter().map(each).sum::<f64>().max(0.0)
+        };
+        let asked: Vec<f64> = rows.iter().step_by(rows.len().div_ceil(ASKED).max(1)).map(variance).collect();
+        let mean = |values: &mut dyn Iterator<Item = f64>, count: usize| values.sum::<f64>() / count.max(1) as f64;
+        let left = mean(&mut rows.iter().map(|row| residual[joint][*row].powi(2)), rows.len());
+        let by_numbers = mean(&mut asked.iter().copied(), asked.len());
+        let misfit = (left - problem.noise[joint].sigma.powi(2) - by_numbers).max(0.0);
+        let mut usual: Vec<f64> = asked.iter().map(|variance| COVERAGE * (variance + misfit).sqrt()).collect();
+        [misfit.sqrt(), nearest(&mut usual, 0.5).unwrap_or(0.0)]
+    };
+    (0..problem.joints()).map(of).collect()
+}
+
+fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> JointRange {
     let rows = || (0..problem.reduction.rows.len()).filter(|row| !problem.in_event(*row)).map(|row| problem.reduction.rows[row]);
     let most = |course: &[f64]| rows().map(|row| course[row].abs()).fold(0.0, f64::max);
     let position = &problem.scene.position[joint];
@@ -62,6 +107,9 @@ fn range(problem: &TorqueProblem, joint: usize) -> JointRange {
         position: ends,
         speed: most(&problem.scene.velocity[joint]),
         acceleration: most(&problem.scene.acceleration[joint]),
+        load: most(&problem.scene.rigid[joint]),
+        misfit,
+        usual,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
+use super::bodies::with_bodies;
 use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
@@ -13,7 +14,8 @@ use super::problem::TorqueProblem;
 use super::solve::SolvedTorques;
 use super::sweep::SweptColumns;
 use super::types::{
-    InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
+    EnforcedBodies, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueFinding, TorqueLeftover,
+    TorqueNoise, TorqueParameter, TorqueQuestion,
 };
 use super::unseen::not_observable;
 use crate::diagnose::VerdictKind;
@@ -28,12 +30,14 @@ const DEVIATIONS: f64 = 3.0;
 const LASTING: f64 = 8.0;
 
 /// All of it.
-pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -> TorqueDiagnosis {
+pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut remarks: Vec<String>) -> TorqueDiagnosis {
     let problem = &solved.problem;
-    let choice = CauseChoice::new(problem, &solved.weighted, seed);
+    let choice = CauseChoice::new(problem, &solved.weighted, question.seed);
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
-    let solution = sweep.solution();
+    let free = sweep.solution();
+    let bodies = if question.enforce_bodies { with_bodies(problem, set, &sweep, &free) } else { None };
+    let (solution, enforced) = bodies.map_or_else(|| (free.clone(), None), |(solution, enforced)| (solution, Some(enforced)));
     // As the arm is simulated today: as declared, else with identified masses alone.
     let today = if problem.scene.declared.is_some() { Vec::new() } else { choice.base.solution() };
     let (first, last) = (problem.residual(&today), problem.residual(&solution));
@@ -41,6 +45,9 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
     let held = counted_rows(true);
     let judging = if held.is_empty() { counted_rows(false) } else { held.clone() };
     let (before, after) = (errors(problem, &first, &judging), errors(problem, &last, &judging));
+    if let Some(enforced) = &enforced {
+        remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
+    }
     let mut found = findings(&choice, set, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
@@ -79,7 +86,21 @@ pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -
         inertials: inertials(problem, set, &sweep, &solution),
         friction: friction_curves(problem, set, &sweep),
         model: TorqueModel::of(&choice, set, &sweep, &solution),
+        enforced,
     }
+}
+
+/// What it costs that links are bodies.
+fn said_of_bodies(enforced: &EnforcedBodies, before: &TorqueErrors, after: &TorqueErrors) -> String {
+    let links: Vec<String> = enforced.links.iter().map(|link| (link + 1).to_string()).collect();
+    format!(
+        "no body has the numbers of link {}: all links are bodies now, at the price of {:.1} of the whitened squared residual; mean NRMSE of \
+         judged rows {:.4} before, {:.4} after; sigmas are those of before",
+        links.join(", "),
+        enforced.cost,
+        before.nrmse_mean,
+        after.nrmse_mean
+    )
 }
 
 /// How rows came about.

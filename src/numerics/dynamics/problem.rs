@@ -37,6 +37,8 @@ pub(super) struct TorqueProblem<'a> {
     held_out: Vec<bool>,
     pub events: Vec<ContactEvent>,
     pub noise: Vec<JointNoise>,
+    /// Least and greatest, C, where it was recorded.
+    pub temperature: Option<[f64; 2]>,
 }
 
 impl<'a> TorqueProblem<'a> {
@@ -72,6 +74,7 @@ impl<'a> TorqueProblem<'a> {
             measured: Vec::new(),
             events: Vec::new(),
             noise: Vec::new(),
+            temperature: recording.temperature.as_deref().and_then(ends),
         };
         problem.shift(0.0);
         problem
@@ -236,6 +239,14 @@ impl<'a> TorqueProblem<'a> {
         }
         left
     }
+}
+
+/// Least and greatest; `None` where no value is known.
+fn ends(values: &[f64]) -> Option<[f64; 2]> {
+    let ends = |[least, greatest]: [f64; 2], value: &f64| [least.min(*value), greatest.max(*value)];
+    let known = values.iter().filter(|value| value.is_finite());
+    let found = known.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+    (found[0] <= found[1]).then_some(found)
 }
 
 /// A smooth course between its rows: cubic through the four nearest.

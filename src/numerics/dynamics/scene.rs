@@ -97,8 +97,12 @@ impl<'a> DynamicScene<'a> {
 
     /// Takes 10 n inertial numbers for the rigid torques.
     pub fn believe(&mut self, theta: &[f64]) {
-        let gravity = self.arm.gravity;
-        self.rigid = self.torques(theta, &gravity, true);
+        self.rigid = self.torques_of(theta);
+    }
+
+    /// Rigid torques of 10 n inertial numbers, `[joint][row]`.
+    pub fn torques_of(&self, theta: &[f64]) -> Vec<Vec<f64>> {
+        self.torques(theta, &self.arm.gravity, true)
     }
 
     /// Torques of a gravity from the side.

@@ -14,6 +14,8 @@ pub struct TorqueQuestion {
     pub cutoff: Option<f64>,
     /// Names of causes that are not tried.
     pub without: Vec<String>,
+    /// Whether the numbers of declared links are moved to the nearest that bodies have.
+    pub enforce_bodies: bool,
     /// Of the bootstrap.
     pub seed: u64,
 }
@@ -195,6 +197,15 @@ pub struct TorqueCourses {
     pub corrected: Vec<f64>,
 }
 
+/// Links that were moved to bodies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnforcedBodies {
+    /// Links that were no bodies, from 0.
+    pub links: Vec<usize>,
+    /// What the whitened squared residual rises by, tolerances of the declared masses included.
+    pub cost: f64,
+}
+
 /// The outcome of a diagnosis of torques.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TorqueDiagnosis {
@@ -237,4 +248,6 @@ pub struct TorqueDiagnosis {
     pub friction: Vec<FrictionCurve>,
     /// All that was identified, as torques are predicted with it.
     pub model: TorqueModel,
+    /// Links whose numbers were moved to those of bodies, where that was asked and any had to be.
+    pub enforced: Option<EnforcedBodies>,
 }

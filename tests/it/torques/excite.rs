@@ -144,7 +144,7 @@ fn the_file_of_a_motion_is_one_that_compensate_takes() {
     assert!(told.contains("condition number") && told.contains("will not determine"), "{told}");
     let text = std::fs::read_to_string(&file).expect("a file");
     let robot = calib::identified::robot_file(&robot, None).expect("a robot");
-    let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot).expect("a motion");
+    let trajectory = calib::targets::Trajectory::read("motion.csv", &text, &robot, false).expect("a motion");
     assert_eq!(trajectory.motion.time.len(), 401);
     assert!(trajectory.motion.acceleration.is_some());
 }

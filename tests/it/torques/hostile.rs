@@ -46,10 +46,9 @@ impl Sheet {
     }
 }
 
-/// An arm with motor currents.
-fn case() -> (TorqueCase, Sheet) {
-    let case =
-        (0..20).map(|number| TorqueCase::draw(&nothing(5), number)).find(|case| case.robot.name == "compact6").expect("one");
+/// An arm: `compact6` with motor currents, `seven7r` with torque sensors.
+fn case(robot: &str) -> (TorqueCase, Sheet) {
+    let case = (0..20).map(|number| TorqueCase::draw(&nothing(5), number)).find(|case| case.robot.name == robot).expect("one");
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }
@@ -60,7 +59,11 @@ fn columns(pattern: &str) -> Vec<String> {
 
 /// What calib says of a changed recording; the exit code too.
 fn told(change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32, String) {
-    let (case, mut sheet) = case();
+    told_of("compact6", change, folder)
+}
+
+fn told_of(robot: &str, change: impl FnOnce(&mut Sheet), folder: &Path) -> (i32, String) {
+    let (case, mut sheet) = case(robot);
     change(&mut sheet);
     write(folder, &[case.recording()[0].clone(), ("recording.csv", sheet.text())]);
     let output = diagnose(folder, &folder.join("store"), &[]);
@@ -140,4 +143,72 @@ fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let (code, said) = told(spoiled(400), folder.path());
     assert_eq!(code, 0, "{said}");
+}
+
+/// One way to spoil a recording: whose, how, the code, and words of the answer.
+type Spoiled = (&'static str, &'static str, fn(&mut Sheet), i32, &'static [&'static str]);
+
+fn each(pattern: &str, joints: usize) -> Vec<String> {
+    (1..=joints).map(|joint| pattern.replace("{j}", &joint.to_string())).collect()
+}
+
+fn cut(sheet: &mut Sheet, name: &str, share: f64) {
+    let column = sheet.column(name);
+    let most = (0..sheet.rows.len()).map(|row| sheet.number(row, column).abs()).fold(0.0, f64::max);
+    sheet.change(&[name.into()], |value| value.clamp(-share * most, share * most));
+}
+
+const SPOILED: [Spoiled; 12] = [
+    ("seven7r", "Nmm for Nm", |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e3 * x), 10, &["torque", "a unit", "1,000"]),
+    ("seven7r", "kNm for Nm", |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e-3 * x), 10, &["torque", "a unit", "1,000"]),
+    ("compact6", "mA for A", |sheet| sheet.change(&each("i{j}_a", 6), |x| 1e3 * x), 10, &["torque", "a unit", "1,000"]),
+    ("compact6", "currents exchanged", |sheet| sheet.exchange("i2_a", "i3_a"), 10, &["joint 2 and joint 3 look exchanged"]),
+    (
+        "compact6",
+        "angles exchanged",
+        |sheet| sheet.exchange("q2_deg", "q3_deg"),
+        10,
+        &["the angles of joint 2 and joint 3 look exchanged"],
+    ),
+    (
+        "compact6",
+        "joints exchanged",
+        |sheet| {
+            sheet.exchange("q2_deg", "q3_deg");
+            sheet.exchange("i2_a", "i3_a");
+        },
+        10,
+        &["joint 2 and joint 3 look exchanged"],
+    ),
+    ("compact6", "another sign", |sheet| sheet.change(&["i2_a".into()], |x| -x), 10, &["joint 2", "the other sign"]),
+    ("compact6", "radians taken for degrees", |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_radians), 10, &["radians"]),
+    (
+        "compact6",
+        "degrees taken for radians",
+        |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_degrees),
+        10,
+        &["q2_deg", "allowed: -1145.9"],
+    ),
+    ("compact6", "currents cut off", |sheet| cut(sheet, "i2_a", 0.5), 10, &["joint 2", "the current is cut off"]),
+    ("compact6", "a dead current", |sheet| sheet.change(&["i5_a".into()], |_| 0.0), 10, &["current of joint 5"]),
+    ("compact6", "dead angles", |sheet| sheet.change(&each("q{j}_deg", 6), |_| 12.0), 10, &["hardly moves"]),
+];
+
+#[test]
+fn spoiled_recordings_are_refused_with_a_code_and_a_sentence() {
+    let mut wrong = Vec::new();
+    for (robot, what, change, code, words) in SPOILED {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (found, said) = told_of(robot, change, folder.path());
+        println!("{what}: code {found}: {}", said.lines().next().unwrap_or_default());
+        if found != code || words.iter().any(|word| !said.contains(word)) {
+            wrong.push(format!("{what}: code {found}, wanted {code} and {words:?}: {said}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_clock_in_milliseconds_that_is_called_seconds_is_refused() {
+    refused(|sheet| sheet.change(&["time_s".into()], |time| 1e3 * time), &["time", "Hz"]);
 }

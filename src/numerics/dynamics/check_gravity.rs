@@ -1,0 +1,173 @@
+//! A recording beside the gravity of the declared arm: torques in a wrong unit, with another sign or of another joint, and angles in a wrong
+//! unit or of another joint.
+
+use super::arm::DynamicArm;
+use super::inertials::DeclaredInertials;
+use super::newton_euler::{InverseDynamics, MotionRow};
+use super::recording::TorqueRecording;
+use crate::error::Fault;
+use crate::statistics::nearest;
+
+/// Of torque measured over simulated: beyond it, or below its inverse, a unit is wrong.
+const UNIT_RATIO: f64 = 50.0;
+/// Of the squared error with another reading of the columns over that without.
+const EXCHANGED: f64 = 0.2;
+/// Nm: below it gravity shows nothing of units.
+const SMALL_TORQUE: f64 = 1e-3;
+/// Rows at which other readings of the angles are tried.
+const TRIED: usize = 300;
+/// rad.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// All of them; none where no masses are declared.
+pub(super) fn gravity_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
+    let Some(links) = &arm.links else { return Vec::new() };
+    let theta = DeclaredInertials::of(arm, links).theta;
+    let faults = torque_faults(arm, recording, &theta);
+    if faults.is_empty() { angle_fault(arm, recording, &theta).into_iter().collect() } else { faults }
+}
+
+/// Torques beside those of the declared arm standing still: units, signs, joints.
+fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> Vec<Fault> {
+    let n = recording.joints;
+    let mut dynamics = InverseDynamics::new(arm);
+    let (still, mut gravity) = (vec![0.0; n], vec![0.0; n]);
+    let (mut measured_square, mut gravity_square) = (vec![0.0; n], vec![0.0; n]);
+    let mut products = vec![vec![0.0; n]; n];
+    for row in 0..recording.rows() {
+        let position = &recording.position[row * n..(row + 1) * n];
+        dynamics.torque(MotionRow { position, velocity: &still, acceleration: &still }, &arm.gravity, theta, &mut gravity);
+        for joint in 0..n {
+            let torque = recording.torque[row * n + joint];
+            measured_square[joint] += torque * torque;
+            gravity_square[joint] += gravity[joint] * gravity[joint];
+            gravity.iter().enumerate().for_each(|(other, value)| products[joint][other] += torque * value);
+        }
+    }
+    let weighty: Vec<usize> =
+        (0..n).filter(|joint| (gravity_square[*joint] / recording.rows() as f64).sqrt() > SMALL_TORQUE).collect();
+    let mut ratios: Vec<f64> = weighty.iter().map(|joint| (measured_square[*joint] / gravity_square[*joint]).sqrt()).collect();
+    let mut faults = Vec::new();
+    let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
+    if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
+        let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
+        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&own) {
+            faults.push(Fault::new(
+                "torque",
+                format!("torques are {own:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or torque constant is wrong (by 1,000?)", heaviest + 1),
+            ));
+            return faults;
+        }
+    }
+    let left = |joint: usize, other: usize| measured_square[joint] - 2.0 * products[joint][other] + gravity_square[other];
+    for (place, joint) in weighty.iter().enumerate() {
+        if products[*joint][*joint] < -0.8 * (measured_square[*joint] * gravity_square[*joint]).sqrt() {
+            faults
+                .push(Fault::new(format!("joint {}", joint + 1), "torques are those of the declared masses with the other sign"));
+        }
+        for other in &weighty[place + 1..] {
+            let straight = left(*joint, *joint) + left(*other, *other);
+            if left(*joint, *other) + left(*other, *joint) < EXCHANGED * straight {
+                faults.push(Fault::new(
+                    "torque",
+                    format!("the columns of joint {} and joint {} look exchanged", joint + 1, other + 1),
+                ));
+            }
+        }
+    }
+    faults
+}
+
+/// Another reading of the recorded angles.
+#[derive(Clone, Copy)]
+enum Reading {
+    /// As they stand.
+    Straight,
+    Scaled(f64),
+    /// The angles of two joints.
+    Exchanged(usize, usize),
+    /// Angles and torques of two joints.
+    Renamed(usize, usize),
+}
+
+/// What is wrong with the angles, where another reading of them explains the torques far better.
+fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> Option<Fault> {
+    let n = recording.joints;
+    let straight = unexplained(arm, recording, theta, Reading::Straight);
+    let pairs = || (0..n).flat_map(|one| (one + 1..n).map(move |other| (one, other)));
+    let others = [Reading::Scaled(1.0 / DEGREE), Reading::Scaled(DEGREE)]
+        .into_iter()
+        .chain(pairs().map(|(one, other)| Reading::Exchanged(one, other)))
+        .chain(pairs().map(|(one, other)| Reading::Renamed(one, other)));
+    let left = others.map(|reading| (reading, unexplained(arm, recording, theta, reading)));
+    let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (left < EXCHANGED * straight).then(|| {
+        let better = (straight / left.max(f64::MIN_POSITIVE)).sqrt();
+        let said = match best {
+            Reading::Scaled(factor) if factor > 1.0 => {
+                "angles were radians already and were converted from degrees once more".into()
+            }
+            Reading::Straight | Reading::Scaled(_) => "angles are degrees where radians are expected".into(),
+            Reading::Exchanged(one, other) => format!("the angles of joint {} and joint {} look exchanged", one + 1, other + 1),
+            Reading::Renamed(one, other) => format!("joint {} and joint {} look exchanged", one + 1, other + 1),
+        };
+        Fault::new("position", format!("{said}: the declared masses explain the torques {better:.0} times better so"))
+    })
+}
+
+/// Sums of torque and gravity of a joint over rows.
+#[derive(Clone, Copy, Default)]
+struct JointSums {
+    torque: f64,
+    gravity: f64,
+    torque_square: f64,
+    gravity_square: f64,
+    product: f64,
+}
+
+impl JointSums {
+    /// Sum of squares about the mean that gravity leaves, itself or `scaled` by what fits best: currents of another joint have its motor.
+    fn left(&self, rows: f64, scaled: bool) -> f64 {
+        let torque = self.torque_square - self.torque * self.torque / rows;
+        let gravity = self.gravity_square - self.gravity * self.gravity / rows;
+        let product = self.product - self.torque * self.gravity / rows;
+        match scaled {
+            true if gravity > 0.0 && product > 0.0 => torque - product * product / gravity,
+            true => torque,
+            false => torque - 2.0 * product + gravity,
+        }
+    }
+}
+
+/// Mean square of what gravity leaves of the torques about their means, Nm^2.
+fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], reading: Reading) -> f64 {
+    let n = recording.joints;
+    let mut dynamics = InverseDynamics::new(arm);
+    let (still, mut gravity, mut position) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let (mut sums, mut rows) = (vec![JointSums::default(); n], 0.0);
+    for row in (0..recording.rows()).step_by(recording.rows().div_ceil(TRIED).max(1)) {
+        position.copy_from_slice(&recording.position[row * n..(row + 1) * n]);
+        let mut torque = recording.torque[row * n..(row + 1) * n].to_vec();
+        match reading {
+            Reading::Straight => (),
+            Reading::Scaled(factor) => position.iter_mut().for_each(|angle| *angle *= factor),
+            Reading::Exchanged(one, other) => position.swap(one, other),
+            Reading::Renamed(one, other) => {
+                position.swap(one, other);
+                torque.swap(one, other);
+            }
+        }
+        let motion = MotionRow { position: &position, velocity: &still, acceleration: &still };
+        dynamics.torque(motion, &arm.gravity, theta, &mut gravity);
+        rows += 1.0;
+        for (sums, (torque, gravity)) in sums.iter_mut().zip(torque.iter().zip(&gravity)) {
+            sums.torque += torque;
+            sums.gravity += gravity;
+            sums.torque_square += torque * torque;
+            sums.gravity_square += gravity * gravity;
+            sums.product += torque * gravity;
+        }
+    }
+    let scaled = |joint: usize| matches!(reading, Reading::Renamed(one, other) if recording.from_current && (joint == one || joint == other));
+    sums.iter().enumerate().map(|(joint, sums)| sums.left(rows, scaled(joint))).sum::<f64>() / rows
+}

@@ -1,0 +1,228 @@
+//! The bodies nearest to inertial numbers that no body has: nearest in the metric of their covariance, over all links at once.
+//!
+//! A link's ten numbers are those of a body where its pseudo-inertia, the second moments of mass about the joint's point with the first
+//! moments and the mass as their border (4 x 4), is positive (Wensing, Kim, Slotine, RA-L 2018). Least squares under that condition is a
+//! projection onto a product of cones, found by alternating directions (ADMM): a step in the metric, a step onto the cones.
+
+use super::newton_euler::{INERTIAL_NUMBERS, inertia_matrix};
+use nalgebra::{DMatrix, DVector, Matrix4};
+use std::f64::consts::SQRT_2;
+
+/// Steps, at most.
+const STEPS: usize = 20_000;
+/// Of the scaled pseudo-inertias: change between two steps at which it ends.
+const SETTLED: f64 = 1e-10;
+/// Least eigenvalue of a scaled pseudo-inertia, of its trace: a body, and not just its limit.
+const LEAST: f64 = 1e-6;
+/// Of the trace: an eigenvalue below it is rounded.
+const ROUNDED: f64 = 1e-12;
+/// Steps between two looks at the weight of the two directions.
+const LOOK: usize = 50;
+/// m: a link's extent where its numbers say none.
+const EXTENT: f64 = 0.1;
+
+/// Numbers that bodies have.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NearestBodies {
+    /// 10 a link.
+    pub theta: Vec<f64>,
+    /// Squared distance in the metric: what the whitened squared residual, tolerances included, rises by.
+    pub cost: f64,
+    /// Links that were no bodies, from 0.
+    pub links: Vec<usize>,
+}
+
+/// The nearest numbers (10 n) that are bodies', by the covariance of all (row-major, 10 n x 10 n). `None` where they are bodies' already.
+pub(super) fn nearest_bodies(theta: &[f64], covariance: &DMatrix<f64>) -> Option<NearestBodies> {
+    let maps: Vec<ConeMap> = theta.chunks_exact(INERTIAL_NUMBERS).map(ConeMap::of).collect();
+    let links: Vec<usize> = maps
+        .iter()
+        .enumerate()
+        .filter(|(link, map)| !map.is_body(&theta[INERTIAL_NUMBERS * link..]))
+        .map(|(link, _)| link)
+        .collect();
+    if links.is_empty() {
+        return None;
+    }
+    let width = theta.len();
+    let mut to = DMatrix::zeros(width, width);
+    for (link, map) in maps.iter().enumerate() {
+        let first = INERTIAL_NUMBERS * link;
+        to.view_mut((first, first), (INERTIAL_NUMBERS, INERTIAL_NUMBERS)).copy_from(&map.matrix);
+    }
+    let start = &to * DVector::from_column_slice(theta);
+    let metric = &to * covariance * to.transpose();
+    let found = projected(&start, &metric, &maps);
+    let back = to.lu();
+    let theta = back.solve(&found)?.as_slice().to_vec();
+    let moved = &found - &start;
+    let (own, vectors) = {
+        let eigen = metric.symmetric_eigen();
+        (eigen.eigenvalues, eigen.eigenvectors)
+    };
+    let least = 1e-14 * own.max();
+    let along = vectors.transpose() * moved;
+    let cost = along.iter().zip(own.iter()).filter(|(_, size)| **size > least).map(|(value, size)| value * value / size).sum();
+    Some(NearestBodies { theta, cost, links })
+}
+
+/// The point of the cones nearest to `start` by the inverse of `metric`.
+fn projected(start: &DVector<f64>, metric: &DMatrix<f64>, maps: &[ConeMap]) -> DVector<f64> {
+    let width = start.len();
+    // Eigenvectors once: a change of weight costs nothing then.
+    let eigen = metric.clone().symmetric_eigen();
+    let sizes = eigen.eigenvalues.map(|size| size.max(0.0));
+    let mut weight = width as f64 / sizes.sum().max(f64::MIN_POSITIVE);
+    let (mut on, mut pull) = (start.clone(), DVector::zeros(width));
+    for step in 0..STEPS {
+        let along = eigen.eigenvectors.transpose() * (&on - &pull - start);
+        let shares = DVector::from_fn(width, |k, _| sizes[k] / (sizes[k] + 1.0 / weight) * along[k]);
+        let free = start + &eigen.eigenvectors * shares;
+        let before = std::mem::replace(&mut on, &free + &pull);
+        for (link, map) in maps.iter().enumerate() {
+            map.onto_cone(&mut on.as_mut_slice()[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)]);
+        }
+        pull += &free - &on;
+        let (apart, moved) = ((&free - &on).norm(), (&on - &before).norm());
+        if apart.max(moved) < SETTLED * (1.0 + start.norm()) {
+            break;
+        }
+        if step % LOOK == LOOK - 1 && (apart > 10.0 * moved || moved > 10.0 * apart) {
+            let factor = if apart > moved { 2.0 } else { 0.5 };
+            weight *= factor;
+            pull /= factor;
+        }
+    }
+    on
+}
+
+/// A link's ten numbers as a scaled pseudo-inertia: ten entries, those beside the diagonal times the root of 2, so that their length is that of
+/// the matrix.
+struct ConeMap {
+    matrix: DMatrix<f64>,
+    /// Least eigenvalue that is allowed.
+    least: f64,
+}
+
+/// Where the ten entries stand.
+const ENTRIES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
+
+impl ConeMap {
+    /// Of a link; scaled by its extent, so that masses and second moments have one size.
+    fn of(ten: &[f64]) -> Self {
+        let second = 0.5 * (ten[4] + ten[7] + ten[9]);
+        let extent = if ten[0] > 0.0 && second > 0.0 { (second / ten[0]).sqrt() } else { EXTENT };
+        let mut matrix = DMatrix::zeros(INERTIAL_NUMBERS, INERTIAL_NUMBERS);
+        for number in 0..INERTIAL_NUMBERS {
+            let mut unit = [0.0; INERTIAL_NUMBERS];
+            unit[number] = 1.0;
+            matrix.column_mut(number).copy_from_slice(&entries(&pseudo_inertia(&unit, extent)));
+        }
+        Self { matrix, least: LEAST * (ten[0].abs() + second.abs() / (extent * extent)) }
+    }
+
+    fn is_body(&self, ten: &[f64]) -> bool {
+        let scaled = &self.matrix * DVector::from_column_slice(&ten[..INERTIAL_NUMBERS]);
+        let matrix = of_entries(scaled.as_slice());
+        matrix.symmetric_eigenvalues().min() >= -ROUNDED * matrix.trace()
+    }
+
+    /// The nearest of the cone.
+    fn onto_cone(&self, ten: &mut [f64]) {
+        let eigen = of_entries(ten).symmetric_eigen();
+        if eigen.eigenvalues.min() >= self.least {
+            return;
+        }
+        let kept = Matrix4::from_diagonal(&eigen.eigenvalues.map(|size| size.max(self.least)));
+        ten.copy_from_slice(&entries(&(eigen.eigenvectors * kept * eigen.eigenvectors.transpose())));
+    }
+}
+
+/// Second and first moments and mass of ten numbers, lengths in `extent`.
+fn pseudo_inertia(ten: &[f64; INERTIAL_NUMBERS], extent: f64) -> Matrix4<f64> {
+    let inertia = inertia_matrix(&ten[4..]);
+    let half = 0.5 * inertia.trace();
+    Matrix4::from_fn(|row, column| match (row.min(column), row.max(column)) {
+        (3, 3) => ten[0],
+        (axis, 3) => ten[1 + axis] / extent,
+        (a, b) => (if a == b { half } else { 0.0 } - inertia[(a, b)]) / (extent * extent),
+    })
+}
+
+fn entries(matrix: &Matrix4<f64>) -> [f64; INERTIAL_NUMBERS] {
+    ENTRIES.map(|(row, column)| matrix[(row, column)] * if row == column { 1.0 } else { SQRT_2 })
+}
+
+fn of_entries(ten: &[f64]) -> Matrix4<f64> {
+    let mut matrix = Matrix4::zeros();
+    for ((row, column), value) in ENTRIES.into_iter().zip(ten) {
+        let value = if row == column { *value } else { value / SQRT_2 };
+        (matrix[(row, column)], matrix[(column, row)]) = (value, value);
+    }
+    matrix
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    /// Two links: a rod whose moment about its own axis is negative, and a ball.
+    fn theta() -> Vec<f64> {
+        let rod = [3.0, 0.3, 0.0, 0.0, -0.02, 0.0, 0.0, 0.08, 0.0, 0.08];
+        let ball = [2.0, 0.2, -0.1, 0.3, 0.02 + 0.208, 0.04, -0.12, 0.02 + 0.28, 0.06, 0.02 + 0.108];
+        rod.into_iter().chain(ball).collect()
+    }
+
+    /// Of numbers that have much to do with each other.
+    fn covariance() -> DMatrix<f64> {
+        let mut dice = ChaCha8Rng::seed_from_u64(7);
+        let sizes: Vec<f64> = (0..20).map(|number| if number % 10 < 4 { 0.02 } else { 0.004 }).collect();
+        let mix = DMatrix::from_fn(20, 20, |row, column| {
+            sizes[row] * (f64::from(u8::from(row == column)) + 0.3 * (dice.random::<f64>() - 0.5))
+        });
+        &mix * mix.transpose()
+    }
+
+    fn distance(theta: &[f64], other: &[f64], covariance: &DMatrix<f64>) -> f64 {
+        let moved = DVector::from_column_slice(other) - DVector::from_column_slice(theta);
+        moved.dot(&covariance.clone().cholesky().expect("positive").solve(&moved))
+    }
+
+    #[test]
+    fn numbers_of_no_body_become_those_of_bodies_and_no_other_bodies_are_nearer() {
+        let (theta, covariance) = (theta(), covariance());
+        let found = nearest_bodies(&theta, &covariance).expect("one is none");
+        assert_eq!(found.links, [0]);
+        let is_body = |all: &[f64]| all.chunks_exact(10).all(|ten| ConeMap::of(ten).is_body(ten));
+        assert!(!is_body(&theta) && is_body(&found.theta));
+        let cost = distance(&theta, &found.theta, &covariance);
+        assert!((found.cost - cost).abs() < 1e-6 * cost, "{} {cost}", found.cost);
+        // On the way from it to any body the distance rises.
+        let mut dice = ChaCha8Rng::seed_from_u64(8);
+        let mut tried = 0;
+        while tried < 2000 {
+            let other: Vec<f64> = found
+                .theta
+                .iter()
+                .zip(covariance.diagonal().iter())
+                .map(|(value, variance)| value + variance.sqrt() * 3.0 * (dice.random::<f64>() - 0.5))
+                .collect();
+            if !is_body(&other) {
+                continue;
+            }
+            tried += 1;
+            let step: Vec<f64> = found.theta.iter().zip(&other).map(|(a, b)| a + 1e-3 * (b - a)).collect();
+            // Up to what is kept off the limit.
+            assert!(distance(&theta, &step, &covariance) > cost * (1.0 - 1e-5));
+        }
+        // What goes with the rod moves with it.
+        assert!(found.theta[10..].iter().zip(&theta[10..]).any(|(a, b)| (a - b).abs() > 1e-6));
+    }
+
+    #[test]
+    fn bodies_stay_as_they_are() {
+        assert!(nearest_bodies(&theta()[10..], &covariance().view((10, 10), (10, 10)).into_owned()).is_none());
+    }
+}
