@@ -38,17 +38,29 @@ impl<'a> CauseChoice<'a> {
     /// Gain beyond the penalty of a form, given a swept set.
     pub fn worth(&self, sweep: &SweptColumns, number: usize) -> f64 {
         let gain = sweep.gain(number);
-        if self.form(number).cause.is_positive() && !sweep.rises(number) {
+        let form = self.form(number);
+        if form.cause.is_positive() && !sweep.rises(number) {
             return f64::NEG_INFINITY;
         }
-        gain.square - self.penalty(number, gain.rank.max(1))
+        let worth = gain.square - self.penalty(number, gain.rank.max(1));
+        let is_possible =
+            || form.cause.is_itself(form, &self.problem.scene) && form.cause.is_possible(form, &sweep.values(number));
+        if worth > 0.0 && !is_possible() { f64::NEG_INFINITY } else { worth }
     }
 
-    /// Whether a coefficient has a sign that its cause cannot have.
+    /// Whether coefficients or shape numbers are such as its cause cannot have.
     pub fn is_impossible(&self, number: usize, solution: &[(usize, f64)]) -> bool {
         let own = self.problem.all.of(number);
         let values = || solution.iter().filter(|(column, _)| own.contains(column)).map(|(_, value)| *value);
         let largest = values().map(f64::abs).fold(0.0, f64::max);
+        let form = self.form(number);
+        let whole: Vec<f64> = own
+            .clone()
+            .map(|column| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value))
+            .collect();
+        if !form.cause.is_itself(form, &self.problem.scene) || !form.cause.is_possible(form, &whole) {
+            return true;
+        }
         self.form(number).cause.is_positive() && values().any(|value| value <= -NEARLY_ZERO * largest)
     }
 

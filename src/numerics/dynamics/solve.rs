@@ -7,7 +7,6 @@ use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
-use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
@@ -52,7 +51,7 @@ pub(super) fn solve<'a>(
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
-        problem.events = contacts(&problem, &residual, &sigmas(&noise), ContactModel::Rich);
+        problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
@@ -100,7 +99,7 @@ fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -
 /// Sets rows aside in which the residual of a set looks like a push.
 fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: ContactModel) {
     let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
-    problem.events = contacts(problem, &problem.residual(&solution), &sigmas(&problem.noise), beside);
+    problem.events = contacts(problem, &problem.residual(&solution), &problem.noise, beside);
 }
 
 /// Whether the same rows are set aside, to a tenth of a second.
@@ -129,11 +128,6 @@ fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<u
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
     problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
-}
-
-/// Nm, per joint.
-fn sigmas(noise: &[JointNoise]) -> Vec<f64> {
-    noise.iter().map(|joint| joint.sigma).collect()
 }
 
 /// A set as a line.

@@ -110,6 +110,8 @@ impl Law {
             Self::SpeedCurve { .. } => &["stribeck_friction"],
             Self::AngleCurve { .. } => &["torque_ripple"],
             Self::HoseDrag { .. } => &["presliding_friction"],
+            // A hose at the joint that arms balance is a spring there.
+            Self::Cable { joint: 1, .. } => &["spring_balance"],
             // What is bolted on moves the centre, too.
             Self::LinkMass { away, .. } if *away != [0.0; 3] => &["link_com"],
             _ => &[],

@@ -11,11 +11,13 @@ pub(super) struct SpringTorque {
 }
 
 /// At the joint that arms balance.
-pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: "spring_balance", balances: true };
+pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: SPRING_BALANCE_NAME, balances: true };
+/// Its name.
+pub(super) const SPRING_BALANCE_NAME: &str = "spring_balance";
 /// At the others.
 pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { name: "cable_stiffness", balances: false };
 /// From 0.
-const BALANCED: usize = 1;
+pub(super) const BALANCED: usize = 1;
 
 impl TorqueCause for SpringTorque {
     fn name(&self) -> &'static str {
@@ -37,6 +39,10 @@ impl TorqueCause for SpringTorque {
             0 => out.copy_from_slice(&scene.position[form.joint()]),
             _ => out.fill(1.0),
         }
+    }
+
+    fn has_shape(&self, shape: &[f64]) -> bool {
+        shape.is_empty()
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
