@@ -7,6 +7,8 @@ use super::weighted::WeightedColumns;
 
 /// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
 const NEARLY_ZERO: f64 = 0.2;
+/// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 7 to 1.
+const CLEAR: f64 = 4.0;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
@@ -115,6 +117,17 @@ impl<'a> CauseChoice<'a> {
 
 /// Removes what is not worth its penalty.
 pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
+    remove_below(choice, set, &|_| 0.0);
+}
+
+/// Removes what is hardly worth its penalty: what may as well be nothing is not named. Viscous and Coulomb friction hardly an arm is without.
+pub(super) fn clear(choice: &CauseChoice, set: &mut Vec<usize>) {
+    let is_common = |number: usize| [VISCOUS, COULOMB].contains(&choice.form(number).cause.name());
+    remove_below(choice, set, &|number| if is_common(number) { 0.0 } else { CLEAR });
+}
+
+/// Removes the least worthy until each is worth what is asked of it.
+fn remove_below(choice: &CauseChoice, set: &mut Vec<usize>, asked: &dyn Fn(usize) -> f64) {
     loop {
         let sweep = choice.base.with(set);
         let solution = sweep.solution();
@@ -126,7 +139,7 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
             let mut rest = set.clone();
             let number = rest.remove(place);
             let loss = sweep.loss(number, &solution);
-            choice.is_whole(&rest).then(|| (place, loss.square - choice.penalty(number, loss.rank.max(1))))
+            choice.is_whole(&rest).then(|| (place, loss.square - choice.penalty(number, loss.rank.max(1)) - asked(number)))
         };
         let least = (0..set.len()).filter_map(worth_of).min_by(|a, b| a.1.total_cmp(&b.1));
         match least {

@@ -29,6 +29,7 @@ mod latency;
 mod leftover;
 mod model;
 mod modelled;
+mod nameless;
 mod newton_euler;
 mod noise;
 mod outcome;

@@ -1,7 +1,7 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::choice::{CauseChoice, backward};
+use super::choice::{CauseChoice, backward, clear};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
@@ -11,7 +11,7 @@ use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
 use super::rich::{noise_beside, rich_forms};
-use super::search::search;
+use super::search::{search, settle};
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
@@ -81,10 +81,11 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted();
     let judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
-        backward(&choice, &mut set);
+        settle(&choice, &mut set);
         let mut judged = judge(&choice, set);
         // What only stood for something that was withdrawn.
         backward(&choice, &mut judged.set);
+        clear(&choice, &mut judged.set);
         judged
     };
     SolvedTorques { problem, weighted, judged, latency: found }

@@ -33,6 +33,10 @@ impl TorqueCause for Balancer {
         }
     }
 
+    fn is_of_angle(&self) -> bool {
+        true
+    }
+
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.len() == 1
     }

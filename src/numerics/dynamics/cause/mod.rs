@@ -122,6 +122,10 @@ pub(super) trait TorqueCause: Sync {
     fn is_itself(&self, _form: &TorqueForm, _scene: &DynamicScene) -> bool {
         true
     }
+    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
+    fn is_of_angle(&self) -> bool {
+        false
+    }
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     fn is_inertial(&self) -> bool {
         false
