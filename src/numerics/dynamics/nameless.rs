@@ -45,12 +45,13 @@ pub(super) fn unname(choice: &CauseChoice, residual: &[Vec<f64>], found: &mut Ve
     let problem = choice.problem;
     let (fitted, held_out) = (problem.runs(false), problem.runs(true));
     for (joint, course) in residual.iter().enumerate() {
-        let over = |runs: &[Range<usize>]| JointNoise::of(course, runs, 0.0).sigma / problem.noise[joint].sigma;
+        let noise = &problem.noise[joint];
+        let over = |runs: &[Range<usize>]| JointNoise::of(course, runs, 0.0).sigma / noise.sigma;
         if over(&fitted) < LEFT || (!held_out.is_empty() && over(&held_out) < LEFT) {
             continue;
         }
-        let white = &problem.weighing(&fitted).measured(residual)[joint];
-        let left = (white.iter().map(|error| error * error).sum::<f64>() - white.len() as f64).max(0.0);
+        let rows = fitted.iter().map(Range::len).sum::<usize>() as f64 / noise.autocorrelation().max(1.0);
+        let left = rows * (over(&fitted).powi(2) - 1.0);
         let here = |finding: &TorqueFinding| finding.place == Place::Joint(joint) && is_judged(finding.effect);
         let explained: f64 = found.iter().filter(|finding| here(finding)).map(|finding| finding.evidence.gain).sum();
         if explained > EXPLAINED * left || found.iter().any(|known| known.effect == UNKNOWN && known.place == Place::Joint(joint))

@@ -4,7 +4,7 @@ use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain}
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// q and 1; of a cable that stiffens as it bends its square and cube, too.
+/// q and 1; of a cable that stiffens as it bends its square and cube, too. Shape of a cable: least and greatest angle, rad.
 pub(super) struct SpringTorque {
     name: &'static str,
     balances: bool,
@@ -16,6 +16,8 @@ pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: SPRING_BAL
 pub(super) const SPRING_BALANCE_NAME: &str = "spring_balance";
 /// At the others.
 pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { name: "cable_stiffness", balances: false };
+/// Angles at which the stiffness is looked at.
+const CHECKED: usize = 8;
 /// Columns.
 const WIDTHS: [usize; 2] = [2, 4];
 /// From 0.
@@ -30,7 +32,11 @@ impl TorqueCause for SpringTorque {
         let cause: &'static dyn TorqueCause = if self.balances { &SPRING_BALANCE } else { &CABLE_STIFFNESS };
         let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
         let widths = if self.balances { &WIDTHS[..1] } else { &WIDTHS[..] };
-        joints.flat_map(|joint| widths.iter().map(move |width| TorqueForm::at_joint(cause, joint, *width))).collect()
+        let form = |joint: usize, width: usize| {
+            let ends = scene.position[joint].iter().fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
+            TorqueForm::at_joint(cause, joint, width).shaped(if self.balances { &[] } else { &ends })
+        };
+        joints.flat_map(|joint| widths.iter().map(move |width| form(joint, *width))).collect()
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
@@ -53,7 +59,15 @@ impl TorqueCause for SpringTorque {
     }
 
     fn has_shape(&self, shape: &[f64]) -> bool {
-        shape.is_empty()
+        !self.balances || shape.is_empty()
+    }
+
+    /// A cable resists: its stiffness is positive wherever the joint moves.
+    fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
+        let number = |power: usize| values.get(power).copied().unwrap_or(0.0);
+        let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
+        let &[least, most] = &form.shape[..] else { return true };
+        (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
