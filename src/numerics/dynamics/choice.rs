@@ -7,8 +7,8 @@ use super::weighted::WeightedColumns;
 
 /// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
 const NEARLY_ZERO: f64 = 0.2;
-/// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 7 to 1.
-const CLEAR: f64 = 4.0;
+/// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 50 to 1.
+const CLEAR: f64 = 8.0;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
