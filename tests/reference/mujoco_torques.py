@@ -7,7 +7,7 @@
 
 Three arms (5, 6 and 7 turning joints), 100 to 500 Hz, sums of sines and moves from point to point, steps of the encoders, noise of the
 currents. Each folder has robot.json and recording.csv (what a user has) and want.json (what MuJoCo's model has besides). Every joint has
-MuJoCo's damping and frictionloss; one further cause is hidden in four of five recordings. Torques are those of mj_inverse.
+MuJoCo's damping and dry friction; one further cause is hidden in four of five recordings. Torques are those of mj_inverse.
 """
 
 import argparse
@@ -84,7 +84,7 @@ def model_of(arm, friction, armature, stiffness, springref):
         body.mass, body.ipos, body.explicitinertial = mass, centre - point, True
         body.fullinertia = [m[0], m[3], m[5], m[1], m[2], m[4]]
         joint = body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
-        joint.frictionloss, joint.armature, joint.springref = friction[1][k], armature[k], springref
+        joint.armature, joint.springref = armature[k], springref
         # Polynomials since MuJoCo 4.
         joint.damping = number(joint.damping, friction[0][k])
         joint.stiffness = number(joint.stiffness, stiffness[k])
@@ -185,6 +185,8 @@ def torques(model, arm, q, told, begin, friction):
             jac = np.zeros((3, q.shape[1]))
             mujoco.mj_jac(model, data, jac, None, at, last)
             out[row] -= jac.T @ push
+    # MuJoCo's frictionloss also depends on acceleration, over a width that its solver chooses: no dry friction of a gear.
+    out += friction[1] * np.tanh(v / 0.01)
     t = begin + np.arange(len(q)) / FINE
     if "warm" in told:
         share, lasts = told["warm"]
