@@ -7,6 +7,8 @@ use super::weighted::WeightedColumns;
 
 /// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
 const NEARLY_ZERO: f64 = 0.2;
+/// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 50 to 1.
+const CLEAR: f64 = 8.0;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
@@ -38,17 +40,29 @@ impl<'a> CauseChoice<'a> {
     /// Gain beyond the penalty of a form, given a swept set.
     pub fn worth(&self, sweep: &SweptColumns, number: usize) -> f64 {
         let gain = sweep.gain(number);
-        if self.form(number).cause.is_positive() && !sweep.rises(number) {
+        let form = self.form(number);
+        if form.cause.is_positive() && !sweep.rises(number) {
             return f64::NEG_INFINITY;
         }
-        gain.square - self.penalty(number, gain.rank.max(1))
+        let worth = gain.square - self.penalty(number, gain.rank.max(1));
+        let is_possible =
+            || form.cause.is_itself(form, &self.problem.scene) && form.cause.is_possible(form, &sweep.values(number));
+        if worth > 0.0 && !is_possible() { f64::NEG_INFINITY } else { worth }
     }
 
-    /// Whether a coefficient has a sign that its cause cannot have.
+    /// Whether coefficients or shape numbers are such as its cause cannot have.
     pub fn is_impossible(&self, number: usize, solution: &[(usize, f64)]) -> bool {
         let own = self.problem.all.of(number);
         let values = || solution.iter().filter(|(column, _)| own.contains(column)).map(|(_, value)| *value);
         let largest = values().map(f64::abs).fold(0.0, f64::max);
+        let form = self.form(number);
+        let whole: Vec<f64> = own
+            .clone()
+            .map(|column| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value))
+            .collect();
+        if !form.cause.is_itself(form, &self.problem.scene) || !form.cause.is_possible(form, &whole) {
+            return true;
+        }
         self.form(number).cause.is_positive() && values().any(|value| value <= -NEARLY_ZERO * largest)
     }
 
@@ -103,6 +117,17 @@ impl<'a> CauseChoice<'a> {
 
 /// Removes what is not worth its penalty.
 pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
+    remove_below(choice, set, &|_| 0.0);
+}
+
+/// Removes what is hardly worth its penalty: what may as well be nothing is not named. Viscous and Coulomb friction hardly an arm is without.
+pub(super) fn clear(choice: &CauseChoice, set: &mut Vec<usize>) {
+    let is_common = |number: usize| [VISCOUS, COULOMB].contains(&choice.form(number).cause.name());
+    remove_below(choice, set, &|number| if is_common(number) { 0.0 } else { CLEAR });
+}
+
+/// Removes the least worthy until each is worth what is asked of it.
+fn remove_below(choice: &CauseChoice, set: &mut Vec<usize>, asked: &dyn Fn(usize) -> f64) {
     loop {
         let sweep = choice.base.with(set);
         let solution = sweep.solution();
@@ -114,7 +139,7 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
             let mut rest = set.clone();
             let number = rest.remove(place);
             let loss = sweep.loss(number, &solution);
-            choice.is_whole(&rest).then(|| (place, loss.square - choice.penalty(number, loss.rank.max(1))))
+            choice.is_whole(&rest).then(|| (place, loss.square - choice.penalty(number, loss.rank.max(1)) - asked(number)))
         };
         let least = (0..set.len()).filter_map(worth_of).min_by(|a, b| a.1.total_cmp(&b.1));
         match least {

@@ -1,5 +1,6 @@
 //! Pushes on the arm: times whose residual stands far above the rest and which one force at the tool explains.
 
+use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::types::ContactEvent;
 use crate::statistics::nearest;
@@ -30,8 +31,9 @@ const GAIN: f64 = 100.0;
 const SHARE: f64 = 0.6;
 /// The same beside a rich model, which takes part of it away: there rows are only set aside.
 const RICH_SHARE: f64 = 0.35;
-/// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
+/// Share of the gain that is not of one joint, and that gain itself: what only one joint feels is no force at the tool.
 const OTHERS: f64 = 0.1;
+const OTHERS_GAIN: f64 = 25.0;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
 
@@ -46,8 +48,26 @@ pub(super) enum ContactModel {
     Judged,
 }
 
-/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time.
-pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], beside: ContactModel) -> Vec<ContactEvent> {
+/// Noise by how many rows count as one.
+#[derive(Clone, Copy)]
+struct EffectiveNoise<'a> {
+    /// Nm per joint, of a row that counts as much as one of white noise.
+    sigma: &'a [f64],
+    /// Squared residual of a row over it, summed over joints, that is noise.
+    usual: f64,
+}
+
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise, in the order of time. Rows count by how long noise lasts.
+pub(super) fn contacts(
+    problem: &TorqueProblem,
+    residual: &[Vec<f64>],
+    noise: &[JointNoise],
+    beside: ContactModel,
+) -> Vec<ContactEvent> {
+    let lasting: Vec<f64> = noise.iter().map(|joint| joint.autocorrelation().max(1.0)).collect();
+    let sigma: Vec<f64> = noise.iter().zip(&lasting).map(|(joint, lasting)| joint.sigma * lasting.sqrt()).collect();
+    let sigma = &sigma[..];
+    let usual: f64 = lasting.iter().map(|lasting| 1.0 / lasting).sum();
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
@@ -69,7 +89,7 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
         if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
             break;
         }
-        let found = best_window(problem, residual, sigma, &time, time[shown[highest]], least_share);
+        let found = best_window(problem, residual, EffectiveNoise { sigma, usual }, &time, time[shown[highest]], least_share);
         events.extend(found.filter(|event| moves(problem, &time, event)));
         let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
         (0..shown.len()).filter(near).for_each(|row| used[row] = true);
@@ -82,7 +102,7 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
 fn best_window(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
-    sigma: &[f64],
+    noise: EffectiveNoise,
     time: &[f64],
     middle: f64,
     least_share: f64,
@@ -92,7 +112,7 @@ fn best_window(
         let first = time.partition_point(|time| *time < start);
         let last = time.partition_point(|time| *time <= start + duration);
         if last >= first + FEWEST {
-            let (event, share) = pushed(problem, residual, sigma, time, start, duration, first..last);
+            let (event, share) = pushed(problem, residual, noise, time, start, duration, first..last);
             if best.as_ref().is_none_or(|(known, _)| event.gain > known.gain) {
                 best = Some((event, share));
             }
@@ -119,13 +139,13 @@ fn best_window(
 fn pushed(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
-    sigma: &[f64],
+    EffectiveNoise { sigma, usual }: EffectiveNoise,
     time: &[f64],
     start: f64,
     duration: f64,
     rows: std::ops::Range<usize>,
 ) -> (ContactEvent, f64) {
-    let usual = (rows.len() * sigma.len()) as f64;
+    let usual = usual * rows.len() as f64;
     let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     let mut by_joint = vec![0.0; sigma.len()];
     let mut along_force = vec![(Matrix3::zeros(), Vector3::zeros()); sigma.len()];
@@ -159,7 +179,7 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    let share = if gain - most < OTHERS * gain { 0.0 } else { gain / (square - usual).max(gain) };
+    let share = if gain - most < (OTHERS * gain).max(OTHERS_GAIN) { 0.0 } else { gain / (square - usual).max(gain) };
     (event, share)
 }
 

@@ -35,6 +35,7 @@ mod leftover;
 mod masses;
 mod model;
 mod modelled;
+mod nameless;
 mod newton_euler;
 mod noise;
 mod outcome;

@@ -8,6 +8,7 @@ use super::findings::{contact, findings, plain_finding};
 use super::friction_curve::friction_curves;
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
+use super::nameless::{unconfirmed, unname};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -24,8 +25,6 @@ use crate::error::counted;
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;
-/// Standard deviations of the mean square of noise.
-const DEVIATIONS: f64 = 3.0;
 /// Rows that count as one, from which on a residual is no noise.
 const LASTING: f64 = 8.0;
 
@@ -51,10 +50,11 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     let mut found = findings(&choice, set, &held);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
+    unname(&choice, &last, &mut found);
     let named = |place: Place| found.iter().any(|known| known.effect == UNKNOWN && known.place == place);
-    let nameless: Vec<TorqueFinding> =
-        nameless(&choice, &solved.judged.withdrawn, &last).into_iter().filter(|one| !named(one.place)).collect();
-    found.extend(nameless);
+    let unconfirmed: Vec<TorqueFinding> =
+        unconfirmed(&choice, &solved.judged.withdrawn, &last).into_iter().filter(|one| !named(one.place)).collect();
+    found.extend(unconfirmed);
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);
@@ -116,30 +116,6 @@ fn late(latency: &super::latency::Latency) -> TorqueFinding {
     let parameter = TorqueParameter { name: "latency".into(), value: milliseconds, unit: "ms", sigma: Some(1e3 * latency.sigma) };
     let statement = format!("torques come {milliseconds:.1} ms later than the positions beside them");
     plain_finding(super::LATENCY, Place::Recording, statement, vec![parameter], latency.gain, 1.0)
-}
-
-/// Something without a name of which held-out rows confirm that it is there, though not its shape: what they leave at its joint stands
-/// above the noise.
-fn nameless(choice: &CauseChoice, withdrawn: &[(usize, f64)], residual: &[Vec<f64>]) -> Vec<TorqueFinding> {
-    let problem = choice.problem;
-    let runs = problem.runs(true);
-    let errors = problem.weighing(&runs).measured(residual);
-    let mut found: Vec<TorqueFinding> = Vec::new();
-    for form in withdrawn.iter().map(|(number, _)| choice.form(*number)).filter(|form| form.cause.name() == UNKNOWN) {
-        let own = &errors[form.joint()];
-        let rows = own.len() as f64;
-        let above = own.iter().map(|error| error * error).sum::<f64>() / rows - 1.0;
-        if above < DEVIATIONS * (2.0 / rows).sqrt() || found.iter().any(|known| known.place == form.place) {
-            continue;
-        }
-        let statement = format!(
-            "something without a name acts at {}: held-out rows are {:.0} % further off than noise, of a shape that they do not confirm",
-            form.place,
-            100.0 * ((1.0 + above).sqrt() - 1.0)
-        );
-        found.push(plain_finding(UNKNOWN, form.place, statement, Vec::new(), above * rows, form.width as f64));
-    }
-    found
 }
 
 fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], over: f64) -> String {

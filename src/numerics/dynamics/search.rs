@@ -2,6 +2,7 @@
 
 use super::bootstrap::beats_chance;
 use super::choice::{CauseChoice, backward};
+use crate::effect::Place;
 
 /// Forms of a set, at most.
 const MOST: usize = 60;
@@ -27,10 +28,7 @@ pub(super) fn search(choice: &CauseChoice, start: Vec<usize>) -> Vec<usize> {
         exchange(choice, &mut set, Some(best));
         merge(choice, &mut set);
     }
-    backward(choice, &mut set);
-    exchange(choice, &mut set, None);
-    merge(choice, &mut set);
-    backward(choice, &mut set);
+    settle(choice, &mut set);
     set
 }
 
@@ -57,24 +55,43 @@ fn exchange(choice: &CauseChoice, set: &mut Vec<usize>, newest: Option<usize>) {
     }
 }
 
-/// One wrong mass, drive or mounting instead of several.
+/// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
 fn merge(choice: &CauseChoice, set: &mut Vec<usize>) {
     let is_inertial = |number: &usize| choice.form(*number).cause.is_inertial();
     let inertial: Vec<usize> = set.iter().copied().filter(is_inertial).collect();
-    if inertial.len() < 2 {
+    let mut groups = pairs(&inertial);
+    if inertial.len() > 1 {
+        groups.push(inertial);
+    }
+    merge_groups(choice, set, &groups, &is_inertial);
+    let mut places: Vec<Place> = set.iter().map(|number| choice.form(*number).place).collect();
+    places.dedup();
+    for place in places {
+        let is_curve = |number: &usize| choice.form(*number).cause.is_of_angle() && choice.form(*number).place == place;
+        let curves: Vec<usize> = set.iter().copied().filter(is_curve).collect();
+        merge_groups(choice, set, &pairs(&curves), &is_curve);
+    }
+}
+
+/// Two of some forms.
+fn pairs(forms: &[usize]) -> Vec<Vec<usize>> {
+    let with =
+        |(place, first): (usize, &usize)| forms[place + 1..].iter().map(|second| vec![*first, *second]).collect::<Vec<_>>();
+    forms.iter().enumerate().flat_map(with).collect()
+}
+
+/// The best of replacing one group by one form of those that `may` stand for it.
+fn merge_groups(choice: &CauseChoice, set: &mut Vec<usize>, groups: &[Vec<usize>], may: &dyn Fn(&usize) -> bool) {
+    if groups.is_empty() {
         return;
     }
     let mut best = (choice.criterion(set), set.clone());
-    let mut groups = vec![inertial.clone()];
-    for (place, first) in inertial.iter().enumerate() {
-        groups.extend(inertial[place + 1..].iter().map(|second| vec![*first, *second]));
-    }
     for group in groups {
         let rest: Vec<usize> = set.iter().copied().filter(|number| !group.contains(number)).collect();
         let sweep = choice.base.with(&rest);
-        let others = (0..choice.open).filter(|number| is_inertial(number) && choice.may_join(*number, &rest));
-        let one = others.max_by(|a, b| choice.worth(&sweep, *a).total_cmp(&choice.worth(&sweep, *b)));
-        let Some(one) = one else { continue };
+        let others = (0..choice.open).filter(|number| may(number) && choice.may_join(*number, &rest));
+        let one = others.map(|number| (choice.worth(&sweep, number), number)).max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, one)) = one else { continue };
         let merged: Vec<usize> = rest.iter().copied().chain([one]).collect();
         let criterion = choice.criterion(&merged);
         if criterion < best.0 {
@@ -82,4 +99,12 @@ fn merge(choice: &CauseChoice, set: &mut Vec<usize>) {
         }
     }
     *set = best.1;
+}
+
+/// Brings a set to rest under a new noise: exchanges, merges and removals, no further forms.
+pub(super) fn settle(choice: &CauseChoice, set: &mut Vec<usize>) {
+    backward(choice, set);
+    exchange(choice, set, None);
+    merge(choice, set);
+    backward(choice, set);
 }

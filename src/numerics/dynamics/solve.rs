@@ -1,18 +1,17 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::choice::{CauseChoice, backward};
+use super::choice::{CauseChoice, backward, clear};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
-use super::noise::JointNoise;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
 use super::rich::{noise_beside, rich_forms};
-use super::search::search;
+use super::search::{search, settle};
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
@@ -52,7 +51,7 @@ pub(super) fn solve<'a>(
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
-        problem.events = contacts(&problem, &residual, &sigmas(&noise), ContactModel::Rich);
+        problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
@@ -82,10 +81,11 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted();
     let judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
-        backward(&choice, &mut set);
+        settle(&choice, &mut set);
         let mut judged = judge(&choice, set);
         // What only stood for something that was withdrawn.
         backward(&choice, &mut judged.set);
+        clear(&choice, &mut judged.set);
         judged
     };
     SolvedTorques { problem, weighted, judged, latency: found }
@@ -100,7 +100,7 @@ fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -
 /// Sets rows aside in which the residual of a set looks like a push.
 fn look_for_contacts(problem: &mut TorqueProblem, weighted: &WeightedColumns, set: &[usize], beside: ContactModel) {
     let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
-    problem.events = contacts(problem, &problem.residual(&solution), &sigmas(&problem.noise), beside);
+    problem.events = contacts(problem, &problem.residual(&solution), &problem.noise, beside);
 }
 
 /// Whether the same rows are set aside, to a tenth of a second.
@@ -129,11 +129,6 @@ fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<u
 /// Takes noise from what the rich model and a set leave.
 fn learn(problem: &mut TorqueProblem, set: &[usize]) {
     problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
-}
-
-/// Nm, per joint.
-fn sigmas(noise: &[JointNoise]) -> Vec<f64> {
-    noise.iter().map(|joint| joint.sigma).collect()
 }
 
 /// A set as a line.

@@ -97,6 +97,22 @@ impl<'a> SweptColumns<'a> {
         self.all.of(form).all(|column| self.right[column] > 0.0)
     }
 
+    /// Coefficients that a form would have beside the present ones; of columns that are not seen, 0.
+    pub fn values(&self, form: usize) -> Vec<f64> {
+        let columns: Vec<usize> = self.all.of(form).collect();
+        let swept = |a: usize, b: usize| self.weighted.gram[a][b] - self.rows.iter().map(|row| row[a] * row[b]).sum::<f64>();
+        let own = |column: &usize| self.weighted.gram[*column][*column];
+        let scale: Vec<f64> = columns.iter().map(|column| own(column).max(f64::MIN_POSITIVE).sqrt()).collect();
+        let mut block =
+            DMatrix::from_fn(columns.len(), columns.len(), |a, b| swept(columns[a], columns[b]) / (scale[a] * scale[b]));
+        (0..columns.len()).for_each(|k| block[(k, k)] += REDUNDANT);
+        let right = DVector::from_fn(columns.len(), |a, _| self.right[columns[a]] / scale[a]);
+        match block.cholesky() {
+            Some(factor) => factor.solve(&right).iter().zip(&scale).map(|(value, scale)| value / scale).collect(),
+            None => vec![0.0; columns.len()],
+        }
+    }
+
     /// The same with other inner products of its columns with a residual.
     pub fn gain_with(&self, form: usize, right: &[f64]) -> f64 {
         self.gain_of(form, right).square

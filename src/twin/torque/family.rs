@@ -7,8 +7,8 @@ use crate::noise::Noise;
 
 /// Families of the list; [`OPEN`] further ones are in no list.
 pub(super) const FAMILIES: usize = 23;
-/// Meshing with another joint, a curve of speed, a curve of angle.
-pub(super) const OPEN: usize = 3;
+/// Meshing with another joint, a curve of speed, a curve of angle, friction by angle, a hose that drags.
+pub(super) const OPEN: usize = 5;
 /// From 0: the joint that a balancer hangs at.
 const BALANCED: usize = 1;
 
@@ -76,7 +76,9 @@ impl Pool<'_> {
                 let last = self.scale.len() - 1;
                 let scale = self.scale[last].min(self.scale[last - 1]);
                 let (viscous, coulomb) = (scale * noise.uniform(0.1, 0.2), scale * noise.uniform(0.1, 0.2));
-                Law::WristCoupling { joint: last, by: last - 1, ratio: noise.sign(), viscous, coulomb, width: self.width }
+                let exponent = if other { noise.uniform(0.6, 0.85) } else { 1.0 };
+                let by = last - 1;
+                Law::WristCoupling { joint: last, by, ratio: noise.sign(), viscous, coulomb, width: self.width, exponent }
             }
             6 | 7 if self.sensors => return None,
             6 => Law::Rotor { joint, inertia: scale * noise.uniform(0.03, 0.08) },
@@ -85,7 +87,10 @@ impl Pool<'_> {
                 let (times, half) = if other { (2.0, scale) } else { (1.0, f64::INFINITY) };
                 Law::TorqueConstant { joint, share: times * share, half }
             }
-            8 => Law::Offset { joint, size: noise.sign() * scale * noise.uniform(0.03, 0.1) },
+            8 => {
+                let drift = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
+                Law::Offset { joint, size: noise.sign() * scale * noise.uniform(0.03, 0.1), drift }
+            }
             9 => {
                 let order = (1 + noise.index(6)) as f64;
                 let overtone = if other { noise.uniform(0.3, 0.6) } else { 0.0 };
@@ -100,7 +105,7 @@ impl Pool<'_> {
                 let hardening = if other { noise.uniform(0.2, 0.5) } else { 0.0 };
                 Law::Cable { joint, stiffness: scale * noise.uniform(0.04, 0.12), zero: angle(noise), hardening }
             }
-            12 => Law::Latency { time: noise.uniform(0.006, 0.02) },
+            12 => Law::Latency { time: noise.uniform(0.006, 0.02), filter: other },
             13 => Law::Elasticity { joint, frequency: noise.uniform(18.0, 35.0), damping: noise.uniform(0.05, 0.2) },
             _ => {
                 let time = noise.uniform(0.03, 0.08);
@@ -125,7 +130,10 @@ impl Pool<'_> {
                 let centre = if other { noise.vector(0.01, 0.03) } else { [0.0; 3] };
                 Law::Payload { mass: noise.sign() * payload * noise.uniform(0.1, 0.3), centre }
             }
-            17 => Law::LinkMass { link: 1 + noise.index(n - 2), share: noise.sign() * noise.uniform(0.06, 0.15) },
+            17 => {
+                let (link, share) = (1 + noise.index(n - 2), noise.sign() * noise.uniform(0.06, 0.15));
+                Law::LinkMass { link, share, away: if other { noise.vector(0.03, 0.1) } else { [0.0; 3] } }
+            }
             18 => Law::LinkCentre { link: 1 + noise.index(n - 2), shift: noise.vector(0.02, 0.05) },
             19 => Law::LinkInertia { link: noise.index(n - 1), share: noise.uniform(0.4, 1.0) },
             20 => {
@@ -156,6 +164,11 @@ impl Pool<'_> {
                 let size = scale * noise.uniform(0.05, 0.12);
                 Law::SpeedCurve { joint, size, width: self.width, waves: waves(noise, [3.0, 9.0]) }
             }
+            3 => {
+                let (size, order) = (scale * noise.uniform(0.05, 0.12), (1 + noise.index(3)) as f64);
+                Law::AngleDrag { joint, size, width: self.width, order, phase: noise.uniform(0.0, 6.2) }
+            }
+            4 => Law::HoseDrag { joint, size: scale * noise.uniform(0.05, 0.15), travel: noise.uniform(0.1, 0.4) },
             _ => Law::AngleCurve { joint, size: scale * noise.uniform(0.03, 0.08), waves: waves(noise, [1.3, 5.0]) },
         }
     }

@@ -39,22 +39,22 @@ pub enum Law {
     Load { joint: usize, share: f64, exponent: f64, width: f64 },
     /// Friction that falls as the gear warms up: share at the begin, and time, s; exponential, in another form as 1 / (1 + t / time).
     Warmup { joint: usize, share: f64, time: f64, slow: bool },
-    /// Friction of a coupled pair by v_joint + ratio v_by, on both.
-    WristCoupling { joint: usize, by: usize, ratio: f64, viscous: f64, coulomb: f64, width: f64 },
+    /// Friction of a coupled pair by v_joint + ratio v_by, on both; the exponent of that velocity is 1 but in another form.
+    WristCoupling { joint: usize, by: usize, ratio: f64, viscous: f64, coulomb: f64, width: f64, exponent: f64 },
     /// kg m2 at the joint.
     Rotor { joint: usize, inertia: f64 },
     /// True torque per stated torque, less 1; in another form it falls with torque, to half at so many Nm.
     TorqueConstant { joint: usize, share: f64, half: f64 },
-    /// Nm.
-    Offset { joint: usize, size: f64 },
+    /// Nm; in another form a share of it comes only as the sensor warms up, within a quarter of a minute.
+    Offset { joint: usize, size: f64, drift: f64 },
     /// Nm, so many per turn of the joint; in another form with an overtone, as a share.
     Ripple { joint: usize, size: f64, order: f64, phase: f64, overtone: f64 },
     /// A balancer: -size sin(q - zero), Nm; in another form a gas spring that is stiffer the more it is bent, by a share.
     Spring { joint: usize, size: f64, zero: f64, gas: f64 },
     /// A hose: -stiffness (q - zero), Nm/rad; hardening in another form.
     Cable { joint: usize, stiffness: f64, zero: f64, hardening: f64 },
-    /// s that torques are logged late.
-    Latency { time: f64 },
+    /// s that torques are logged late; in another form behind a filter of that time.
+    Latency { time: f64, filter: bool },
     /// The gear swings: rad/s and damping ratio.
     Elasticity { joint: usize, frequency: f64, damping: f64 },
     /// Nm after each reversal, and its time, s; in another form half a wave.
@@ -63,8 +63,8 @@ pub enum Law {
     Contact { start: f64, end: f64, force: [f64; 3], held: bool },
     /// kg more on the tool, centre off by m.
     Payload { mass: f64, centre: [f64; 3] },
-    /// Share of a link's mass.
-    LinkMass { link: usize, share: f64 },
+    /// Share of a link's mass; in another form bolted on so far (m) from its centre.
+    LinkMass { link: usize, share: f64, away: [f64; 3] },
     /// m.
     LinkCentre { link: usize, shift: [f64; 3] },
     /// Share of a link's inertia.
@@ -77,7 +77,14 @@ pub enum Law {
     SpeedCurve { joint: usize, size: f64, width: f64, waves: [[f64; 3]; 3] },
     /// No entry of a library: torque (Nm) by a random smooth curve of the joint's angle that no turn repeats.
     AngleCurve { joint: usize, size: f64, waves: [[f64; 3]; 3] },
+    /// No entry of a library: friction (Nm) that is greater at some angles of the joint, so many a turn.
+    AngleDrag { joint: usize, size: f64, width: f64, order: f64, phase: f64 },
+    /// No entry of a library: a hose that drags (Nm) and turns over only after a travel of a good part of a radian.
+    HoseDrag { joint: usize, size: f64, travel: f64 },
 }
+
+/// s in which the zero of a sensor warms up.
+const SENSOR_WARM: f64 = 15.0;
 
 /// What a law keeps of the past.
 #[derive(Debug, Clone, Copy, Default)]
@@ -167,11 +174,34 @@ impl Law {
         }
     }
 
+    /// Joint and torque (Nm) of what no library has.
+    fn curve(&self, now: &Moment, past: &mut Past) -> Option<(usize, f64)> {
+        let (q, v) = (&now.state.q, &now.state.v);
+        Some(match *self {
+            Self::Meshing { joint, by, size, order } => (joint, size * (order * q[by]).sin() * (2.0 * q[joint]).cos()),
+            Self::SpeedCurve { joint, size, width, ref waves } => {
+                (joint, size * sign(v[joint], width) * curve(waves, v[joint].abs()))
+            }
+            Self::AngleCurve { joint, size, ref waves } => (joint, size * curve(waves, q[joint])),
+            Self::AngleDrag { joint, size, width, order, phase } => {
+                (joint, size * sign(v[joint], width) * (1.0 + (order * q[joint] + phase).sin()))
+            }
+            Self::HoseDrag { joint, size, travel } => {
+                let moved = v[joint] * now.step / travel;
+                if moved != 0.0 {
+                    past.bristle[0] = Bristles::One.bent(past.bristle[0], moved);
+                }
+                (joint, size * past.bristle[0])
+            }
+            _ => return None,
+        })
+    }
+
     /// Adds its torque at each joint, Nm.
     pub(super) fn add(&self, now: &Moment, past: &mut Past, torque: &mut [f64]) {
         let v = |joint: usize| now.state.v[joint];
         let q = |joint: usize| now.state.q[joint];
-        if let Some((joint, size)) = self.plain_friction(now.state) {
+        if let Some((joint, size)) = self.plain_friction(now.state).or_else(|| self.curve(now, past)) {
             torque[joint] += size;
         }
         match *self {
@@ -201,14 +231,14 @@ impl Law {
                 let cold = if slow { 1.0 / (1.0 + now.time / time) } else { (-now.time / time).exp() };
                 torque[joint] += share * cold * now.friction[joint];
             }
-            Self::WristCoupling { joint, by, ratio, viscous, coulomb, width } => {
+            Self::WristCoupling { joint, by, ratio, viscous, coulomb, width, exponent } => {
                 let x = v(joint) + ratio * v(by);
-                let drag = viscous * x + coulomb * sign(x, width);
+                let drag = viscous * x.abs().powf(exponent) * x.signum() + coulomb * sign(x, width);
                 torque[joint] += drag;
                 torque[by] += ratio * drag;
             }
             Self::Rotor { joint, inertia } => torque[joint] += inertia * now.state.a[joint],
-            Self::Offset { joint, size } => torque[joint] += size,
+            Self::Offset { joint, size, drift } => torque[joint] += size * (1.0 - drift * (-now.time / SENSOR_WARM).exp()),
             Self::Ripple { joint, size, order, phase, overtone } => {
                 let turn = order * q(joint) + phase;
                 torque[joint] += size * (turn.sin() + overtone * (2.0 * turn + phase).sin());
@@ -232,14 +262,7 @@ impl Law {
             Self::Backlash { joint, size, time, wave } => {
                 torque[joint] += size * past.knock(v(joint), time, wave, now.step);
             }
-            Self::Meshing { joint, by, size, order } => {
-                torque[joint] += size * (order * q(by)).sin() * (2.0 * q(joint)).cos();
-            }
-            Self::SpeedCurve { joint, size, width, ref waves } => {
-                torque[joint] += size * sign(v(joint), width) * curve(waves, v(joint).abs());
-            }
-            Self::AngleCurve { joint, size, ref waves } => torque[joint] += size * curve(waves, q(joint)),
-            // Rigid ones are in the bodies; the recording shifts and scales; friction was added above.
+            // Rigid ones are in the bodies; the recording shifts and scales; friction and curves were added above.
             _ => {}
         }
     }

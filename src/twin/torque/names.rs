@@ -29,7 +29,11 @@ impl Law {
             Self::LinkCentre { .. } => "link_com",
             Self::LinkInertia { .. } => "link_inertia",
             Self::Tilt { .. } => "gravity_direction",
-            Self::Meshing { .. } | Self::SpeedCurve { .. } | Self::AngleCurve { .. } => "unknown",
+            Self::Meshing { .. }
+            | Self::SpeedCurve { .. }
+            | Self::AngleCurve { .. }
+            | Self::AngleDrag { .. }
+            | Self::HoseDrag { .. } => "unknown",
         }
     }
 
@@ -54,7 +58,9 @@ impl Law {
             | Self::Backlash { joint, .. }
             | Self::Meshing { joint, .. }
             | Self::SpeedCurve { joint, .. }
-            | Self::AngleCurve { joint, .. } => Some(joint),
+            | Self::AngleCurve { joint, .. }
+            | Self::AngleDrag { joint, .. }
+            | Self::HoseDrag { joint, .. } => Some(joint),
             _ => None,
         }
     }
@@ -76,7 +82,12 @@ impl Law {
     /// Whether it has another form than the usual formula.
     pub(super) fn is_of_another_form(&self) -> bool {
         match *self {
-            Self::Viscous { exponent, .. } | Self::Load { exponent, .. } => exponent != 1.0,
+            Self::Viscous { exponent, .. } | Self::Load { exponent, .. } | Self::WristCoupling { exponent, .. } => {
+                exponent != 1.0
+            }
+            Self::Offset { drift, .. } => drift != 0.0,
+            Self::Latency { filter, .. } => filter,
+            Self::LinkMass { away, .. } => away != [0.0; 3],
             Self::Asymmetric { by_speed, .. } => by_speed != 0.0,
             Self::Stribeck { fall, .. } => fall != Fall::Exponential(1.0),
             Self::Presliding { bristles, .. } => bristles != Bristles::One,
@@ -98,6 +109,11 @@ impl Law {
             Self::Viscous { exponent, .. } if *exponent != 1.0 => &["unknown", "stribeck_friction"],
             Self::SpeedCurve { .. } => &["stribeck_friction"],
             Self::AngleCurve { .. } => &["torque_ripple"],
+            Self::HoseDrag { .. } => &["presliding_friction"],
+            // A hose at the joint that arms balance is a spring there.
+            Self::Cable { joint: 1, .. } => &["spring_balance"],
+            // What is bolted on moves the centre, too.
+            Self::LinkMass { away, .. } if *away != [0.0; 3] => &["link_com"],
             _ => &[],
         }
     }

@@ -46,7 +46,12 @@ impl TorqueCase {
         let n = machine.axes.len();
         let fine_steps = (FINE / self.rate).ceil().max(1.0) as usize;
         let step = 1.0 / (self.rate * fine_steps as f64);
-        let late = laws.iter().map(|law| if let Law::Latency { time } = law { *time } else { 0.0 }).sum::<f64>();
+        let behind = |filtered: bool| {
+            let time =
+                |law: &&Law| if let Law::Latency { time, filter } = law { (*filter == filtered).then_some(*time) } else { None };
+            laws.iter().filter_map(time).sum::<f64>()
+        };
+        let (late, filter) = (behind(false), behind(true));
         let mut rows = TorqueRows::default();
         let mut begin = 0.0;
         for (number, path) in self.paths.iter().enumerate() {
@@ -88,6 +93,9 @@ impl TorqueCase {
                     rows.rigid.extend(rigid);
                 }
             }
+            if filter > 0.0 {
+                filtered(&mut fine, step / filter);
+            }
             for k in (0..fine.len()).step_by(fine_steps) {
                 // Logged late: a row holds what the torque was.
                 let at = (k as f64 - late / step).clamp(0.0, (fine.len() - 1) as f64);
@@ -127,6 +135,17 @@ impl TorqueCase {
     }
 }
 
+/// Each joint's torque behind a filter of first order; steps in parts of its time.
+fn filtered(fine: &mut [Vec<f64>], step: f64) {
+    let Some(mut kept) = fine.first().cloned() else { return };
+    for torque in fine {
+        for (kept, torque) in kept.iter_mut().zip(torque.iter_mut()) {
+            *kept += (1.0 - (-step).exp()) * (*torque - *kept);
+            *torque = *kept;
+        }
+    }
+}
+
 impl Law {
     /// Changes the bodies or gravity.
     fn change(&self, machine: &mut Machine) {
@@ -139,7 +158,11 @@ impl Law {
                     payload.centre = std::array::from_fn(|i| payload.centre[i] + centre[i]);
                 }
             }
-            Self::LinkMass { link, share } => machine.links[*link].mass *= 1.0 + share,
+            Self::LinkMass { link, share, away } => {
+                let body = &mut machine.links[*link];
+                body.mass *= 1.0 + share;
+                body.centre = std::array::from_fn(|i| body.centre[i] + share / (1.0 + share) * away[i]);
+            }
             Self::LinkCentre { link, shift } => {
                 let body = &mut machine.links[*link];
                 body.centre = std::array::from_fn(|i| body.centre[i] + shift[i]);

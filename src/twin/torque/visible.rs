@@ -11,6 +11,8 @@ const AVERAGED: usize = 4;
 /// What is left of an effect beside another name, as a share and as L, where data cannot separate the two.
 const SAME_SHARE: f64 = 0.02;
 const SAME: f64 = 12.0;
+/// Ripples of more a turn are like nothing else.
+const LARGEST_ORDER: usize = 3;
 /// Added to the diagonal so that what is not determined absorbs nothing, as a share.
 const HELD: f64 = 1e-9;
 
@@ -29,6 +31,8 @@ struct Columns<'a> {
     case: &'a TorqueCase,
     rows: &'a TorqueRows,
     weight: Vec<f64>,
+    /// Nm, of the arm as it is stated, in rows to fit.
+    stated: Vec<f64>,
 }
 
 impl TorqueCase {
@@ -80,7 +84,9 @@ impl<'a> Columns<'a> {
         let lasting = (1.0 + lasts) / (1.0 - lasts);
         let weight = case.white.iter().zip(&case.lasting);
         let weight = weight.map(|(white, own)| (white * white / AVERAGED as f64 + own * own * lasting).sqrt().recip());
-        Self { case, rows, weight: weight.collect() }
+        let fit = rows.validate.iter().filter(|validate| !**validate).count();
+        let stated = rows.state[..fit].iter().flat_map(|state| case.stated.torque(state)).collect();
+        Self { case, rows, weight: weight.collect(), stated }
     }
 
     /// Of torques in all rows.
@@ -101,12 +107,9 @@ impl<'a> Columns<'a> {
     fn of_machine(&self, change: impl Fn(&mut Machine)) -> Vec<f64> {
         let mut machine = self.case.stated.clone();
         change(&mut machine);
-        let less = |state| {
-            let with = machine.torque(state);
-            let without = self.case.stated.torque(state);
-            with.into_iter().zip(without).map(|(with, less)| with - less)
-        };
-        self.of(self.rows.state.iter().flat_map(less))
+        let fit = self.stated.len() / self.weight.len();
+        let with = self.rows.state[..fit].iter().flat_map(|state| machine.torque(state));
+        self.of(with.zip(&self.stated).map(|(with, less)| with - less))
     }
 
     /// Every number of every body changed by one standard deviation.
@@ -134,12 +137,18 @@ impl<'a> Columns<'a> {
             for law in per_joint(joint) {
                 add(&law, vec![self.of_law(&law)]);
             }
+            for laws in waves(joint) {
+                add(&laws[0], laws.iter().map(|law| self.of_law(law)).collect());
+            }
             let law = Law::TorqueConstant { joint, share: 0.0, half: f64::INFINITY };
             let own = self.rows.torque.iter().enumerate().map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
             if !self.case.sensors {
                 add(&law, vec![self.of(own)]);
             }
-            add(&Law::LinkMass { link: joint, share: 0.0 }, vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)]);
+            add(
+                &Law::LinkMass { link: joint, share: 0.0, away: [0.0; 3] },
+                vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)],
+            );
             let centre = (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
             add(&Law::LinkCentre { link: joint, shift: [0.0; 3] }, centre.collect());
             let inertia = (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
@@ -187,11 +196,22 @@ fn per_joint(joint: usize) -> Vec<Law> {
         Law::Stribeck { joint, size: 1.0, speed: 0.1, fall: Fall::Exponential(1.0) },
         Law::Load { joint, share: 1.0, exponent: 1.0, width },
         Law::Rotor { joint, inertia: 1.0 },
-        Law::Offset { joint, size: 1.0 },
+        Law::Offset { joint, size: 1.0, drift: 0.0 },
         Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
         Law::Spring { joint, size: 1.0, zero: 0.0, gas: 0.0 },
         Law::Spring { joint, size: 1.0, zero: std::f64::consts::FRAC_PI_2, gas: 0.0 },
     ]
+}
+
+/// Torques by a joint's angle whose phase is free: a balancer, which is a wave a turn, and ripples.
+fn waves(joint: usize) -> Vec<Vec<Law>> {
+    let phases = [0.0, std::f64::consts::FRAC_PI_2];
+    let ripple = |order: usize| {
+        let law = |phase| Law::Ripple { joint, size: 1.0, order: order as f64, phase, overtone: 0.0 };
+        phases.map(law).to_vec()
+    };
+    let balancer = phases.map(|zero| Law::Spring { joint, size: 1.0, zero, gas: 0.0 }).to_vec();
+    std::iter::once(balancer).chain((1..=LARGEST_ORDER).map(ripple)).collect()
 }
 
 fn square(column: &[f64]) -> f64 {

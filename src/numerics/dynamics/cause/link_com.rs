@@ -10,6 +10,8 @@ use crate::dynamics::types::TorqueParameter;
 pub(super) struct WrongLinkCentre;
 
 const WIDTH: usize = 3;
+/// m: farther off is no error of a declaration.
+const FARTHEST: f64 = 0.2;
 
 impl TorqueCause for WrongLinkCentre {
     fn name(&self) -> &'static str {
@@ -26,6 +28,10 @@ impl TorqueCause for WrongLinkCentre {
 
     fn is_inertial(&self) -> bool {
         true
+    }
+
+    fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {
+        values.iter().all(|shift| shift.abs() < FARTHEST)
     }
 
     fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {

@@ -10,6 +10,9 @@ use crate::dynamics::types::TorqueParameter;
 pub(super) struct HeavierLink;
 
 const WIDTH: usize = 1;
+/// Of the declared mass: more is no error of a declaration.
+const LEAST: f64 = -0.7;
+const MOST: f64 = 1.0;
 
 impl TorqueCause for HeavierLink {
     fn name(&self) -> &'static str {
@@ -26,6 +29,10 @@ impl TorqueCause for HeavierLink {
 
     fn is_inertial(&self) -> bool {
         true
+    }
+
+    fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {
+        (LEAST..=MOST).contains(&values[0])
     }
 
     fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {

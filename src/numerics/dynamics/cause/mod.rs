@@ -3,6 +3,7 @@
 //! A cause proposes forms: itself at a place with shape numbers. A form is a group of columns, torques at joints that enter linearly.
 
 mod asymmetric;
+mod balancer;
 mod coulomb;
 mod elasticity;
 mod gravity_direction;
@@ -37,7 +38,7 @@ pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
 
 /// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 23] = [
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 24] = [
     &viscous::Viscous,
     &coulomb::Coulomb,
     &offset::Offset,
@@ -49,6 +50,7 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 23] = [
     &rotor::Rotor,
     &torque_constant::TorqueConstant,
     &spring::SPRING_BALANCE,
+    &balancer::Balancer,
     &spring::CABLE_STIFFNESS,
     &ripple::Ripple,
     &elasticity::Elasticity,
@@ -110,6 +112,18 @@ pub(super) trait TorqueCause: Sync {
     }
     /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
     fn is_positive(&self) -> bool {
+        false
+    }
+    /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
+    fn is_possible(&self, _form: &TorqueForm, _values: &[f64]) -> bool {
+        true
+    }
+    /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
+    fn is_itself(&self, _form: &TorqueForm, _scene: &DynamicScene) -> bool {
+        true
+    }
+    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
+    fn is_of_angle(&self) -> bool {
         false
     }
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.

@@ -31,6 +31,10 @@ impl TorqueCause for Offset {
         out.fill(1.0);
     }
 
+    fn is_of_angle(&self) -> bool {
+        true
+    }
+
     fn coefficients(&self) -> &'static [CoefficientName] {
         &[("offset", "Nm")]
     }

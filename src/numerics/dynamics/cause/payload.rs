@@ -12,6 +12,8 @@ pub(super) struct Payload;
 
 /// kg: less is nothing to have a centre.
 const LIGHTEST: f64 = 0.1;
+/// m by which its centre is elsewhere, at most.
+const FARTHEST: f64 = 0.5;
 /// Changes of the last link's numbers but the mass.
 const OTHERS: [&str; 9] =
     ["moment_x", "moment_y", "moment_z", "inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy", "inertia_yz", "inertia_zz"];
@@ -38,6 +40,13 @@ impl TorqueCause for Payload {
 
     fn is_inertial(&self) -> bool {
         true
+    }
+
+    fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
+        let whole = form.shape[0] + values[0];
+        let centred =
+            form.width == INERTIAL_NUMBERS || values[1..].iter().all(|moment| moment.abs() < FARTHEST * whole.max(LIGHTEST));
+        whole > -LIGHTEST && centred
     }
 
     fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {

@@ -49,6 +49,10 @@ impl TorqueCause for Ripple {
         form.with[1] == 0 && form.with[0] <= USUAL
     }
 
+    fn is_of_angle(&self) -> bool {
+        true
+    }
+
     fn may_repeat(&self) -> bool {
         true
     }

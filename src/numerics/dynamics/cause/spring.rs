@@ -1,21 +1,27 @@
 //! Torque that grows with the angle of a joint: a balancing spring at joint 2, a cable or hose elsewhere.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, plain};
+use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// q and 1.
+/// q and 1; of a cable that stiffens as it bends its square and cube, too. Shape of a cable: least and greatest angle, rad.
 pub(super) struct SpringTorque {
     name: &'static str,
     balances: bool,
 }
 
 /// At the joint that arms balance.
-pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: "spring_balance", balances: true };
+pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: SPRING_BALANCE_NAME, balances: true };
+/// Its name.
+pub(super) const SPRING_BALANCE_NAME: &str = "spring_balance";
 /// At the others.
 pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { name: "cable_stiffness", balances: false };
+/// Angles at which the stiffness is looked at.
+const CHECKED: usize = 8;
+/// Columns.
+const WIDTHS: [usize; 2] = [2, 4];
 /// From 0.
-const BALANCED: usize = 1;
+pub(super) const BALANCED: usize = 1;
 
 impl TorqueCause for SpringTorque {
     fn name(&self) -> &'static str {
@@ -25,26 +31,51 @@ impl TorqueCause for SpringTorque {
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let cause: &'static dyn TorqueCause = if self.balances { &SPRING_BALANCE } else { &CABLE_STIFFNESS };
         let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
-        joints.map(|joint| TorqueForm::at_joint(cause, joint, 2)).collect()
+        let widths = if self.balances { &WIDTHS[..1] } else { &WIDTHS[..] };
+        let form = |joint: usize, width: usize| {
+            let ends = scene.position[joint].iter().fold([f64::MAX, f64::MIN], |[a, b], q| [a.min(*q), b.max(*q)]);
+            TorqueForm::at_joint(cause, joint, width).shaped(if self.balances { &[] } else { &ends })
+        };
+        joints.flat_map(|joint| widths.iter().map(move |width| form(joint, *width))).collect()
     }
 
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.width == WIDTHS[0]
+    }
+
+    fn is_of_angle(&self) -> bool {
         true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         match column {
             0 => out.copy_from_slice(&scene.position[form.joint()]),
-            _ => out.fill(1.0),
+            1 => out.fill(1.0),
+            power => {
+                let angle = &scene.position[form.joint()];
+                fill(out, |row| angle[row].powi(power as i32));
+            }
         }
     }
 
+    fn has_shape(&self, shape: &[f64]) -> bool {
+        !self.balances || shape.is_empty()
+    }
+
+    /// A cable resists: its stiffness is positive wherever the joint moves.
+    fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
+        let number = |power: usize| values.get(power).copied().unwrap_or(0.0);
+        let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
+        let &[least, most] = &form.shape[..] else { return true };
+        (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
+    }
+
     fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("stiffness", "Nm/rad"), ("at_zero", "Nm")]
+        &[("stiffness", "Nm/rad"), ("at_zero", "Nm"), ("square", "Nm/rad2"), ("cube", "Nm/rad3")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("stiffness", fitted[0], "Nm/rad"), plain("at_zero", fitted[1], "Nm")]
+        self.coefficients().iter().zip(fitted).map(|((name, unit), number)| plain(name, *number, unit)).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -9,6 +9,8 @@ pub(super) struct Stribeck;
 
 /// rad/s: the one that stands in the rich model, and all that are tried.
 const USUAL: f64 = 0.1;
+/// Widths of the sign.
+const NARROWEST: f64 = 2.0;
 const SPEEDS: [&[f64]; 5] = [&[0.05], &[0.07], &[USUAL], &[0.15], &[0.25]];
 
 impl TorqueCause for Stribeck {
@@ -22,6 +24,11 @@ impl TorqueCause for Stribeck {
 
     fn modifies(&self) -> &'static [&'static str] {
         &[COULOMB]
+    }
+
+    /// What falls within the width over which the sign turns is a sign of another width.
+    fn is_itself(&self, form: &TorqueForm, scene: &DynamicScene) -> bool {
+        form.shape[0] > NARROWEST * scene.sign_width
     }
 
     fn is_positive(&self) -> bool {

@@ -7,6 +7,9 @@ use crate::dynamics::types::TorqueParameter;
 /// A current that stands for another torque than declared.
 pub(super) struct TorqueConstant;
 
+/// Share of the declared one: more is no error of a drive.
+const MOST: f64 = 0.6;
+
 impl TorqueCause for TorqueConstant {
     fn name(&self) -> &'static str {
         "torque_constant"
@@ -31,6 +34,10 @@ impl TorqueCause for TorqueConstant {
 
     fn is_of_rigid(&self) -> bool {
         true
+    }
+
+    fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {
+        values[0].abs() < MOST
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {

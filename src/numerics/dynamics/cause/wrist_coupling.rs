@@ -13,6 +13,7 @@ const RATIOS: [f64; 14] = [-1.4, -1.2, -1.0, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0
 const PLAIN_RATIOS: [f64; 2] = [-1.0, 1.0];
 /// Ratios that stand in the rich model.
 const USUAL: [f64; 2] = [-0.6, 1.0];
+const LEAST_RATIO: f64 = 0.15;
 /// Joints of a wrist begin here, from 0.
 const WRIST: usize = 3;
 
@@ -46,6 +47,11 @@ impl TorqueCause for WristCoupling {
 
     fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
         vec![form.joint(), form.with[0]]
+    }
+
+    /// Gears that hardly turn with the other joint do not turn with it.
+    fn is_itself(&self, form: &TorqueForm, _scene: &DynamicScene) -> bool {
+        form.shape[0].abs() > LEAST_RATIO
     }
 
     fn is_positive(&self) -> bool {

@@ -1,0 +1,99 @@
+//! What has no name: forms without one that held-out rows do not confirm, and joints of which the named causes leave too much.
+
+use super::cause::{COULOMB, TORQUE_CAUSES, UNKNOWN, VISCOUS};
+use super::choice::CauseChoice;
+use super::findings::plain_finding;
+use super::noise::JointNoise;
+use super::types::{TorqueFinding, TorqueRival};
+use crate::effect::Place;
+use std::ops::Range;
+
+/// Standard deviations of the mean square of noise.
+const DEVIATIONS: f64 = 3.0;
+/// Of fitted and of held-out rows over the noise, above which something is left at a joint.
+const LEFT: f64 = 1.2;
+/// Times what is left that a name must explain: less than two thirds of what stands at a joint is no explanation.
+const EXPLAINED: f64 = 2.0;
+
+/// Something without a name of which held-out rows confirm that it is there, though not its shape: what they leave at its joint stands
+/// above the noise.
+pub(super) fn unconfirmed(choice: &CauseChoice, withdrawn: &[(usize, f64)], residual: &[Vec<f64>]) -> Vec<TorqueFinding> {
+    let problem = choice.problem;
+    let runs = problem.runs(true);
+    let errors = problem.weighing(&runs).measured(residual);
+    let mut found: Vec<TorqueFinding> = Vec::new();
+    for form in withdrawn.iter().map(|(number, _)| choice.form(*number)).filter(|form| form.cause.name() == UNKNOWN) {
+        let own = &errors[form.joint()];
+        let rows = own.len() as f64;
+        let above = own.iter().map(|error| error * error).sum::<f64>() / rows - 1.0;
+        if above < DEVIATIONS * (2.0 / rows).sqrt() || found.iter().any(|known| known.place == form.place) {
+            continue;
+        }
+        let statement = format!(
+            "something without a name acts at {}: held-out rows are {:.0} % further off than noise, of a shape that they do not confirm",
+            form.place,
+            100.0 * ((1.0 + above).sqrt() - 1.0)
+        );
+        found.push(plain_finding(UNKNOWN, form.place, statement, Vec::new(), above * rows, form.width as f64));
+    }
+    found
+}
+
+/// "None of the list" competes with each name: where the causes of a joint leave more than noise and explain less than two thirds of what
+/// stands there, it is something without a name, with theirs as rivals; where there are none, too.
+pub(super) fn unname(choice: &CauseChoice, residual: &[Vec<f64>], found: &mut Vec<TorqueFinding>) {
+    let problem = choice.problem;
+    let (fitted, held_out) = (problem.runs(false), problem.runs(true));
+    for (joint, course) in residual.iter().enumerate() {
+        let noise = &problem.noise[joint];
+        let over = |runs: &[Range<usize>]| JointNoise::of(course, runs, 0.0).sigma / noise.sigma;
+        if over(&fitted) < LEFT || (!held_out.is_empty() && over(&held_out) < LEFT) {
+            continue;
+        }
+        let rows = fitted.iter().map(Range::len).sum::<usize>() as f64 / noise.autocorrelation().max(1.0);
+        let left = rows * (over(&fitted).powi(2) - 1.0);
+        let here = |finding: &TorqueFinding| finding.place == Place::Joint(joint) && is_judged(finding.effect);
+        let explained: f64 = found.iter().filter(|finding| here(finding)).map(|finding| finding.evidence.gain).sum();
+        if explained > EXPLAINED * left || found.iter().any(|known| known.effect == UNKNOWN && known.place == Place::Joint(joint))
+        {
+            continue;
+        }
+        let (names, others): (Vec<TorqueFinding>, Vec<TorqueFinding>) = found.drain(..).partition(here);
+        *found = others;
+        found.push(without_name(joint, left, over(&fitted), names));
+    }
+}
+
+/// Whether a name stands for something beside the friction that hardly a joint is without, and no wrong mass.
+fn is_judged(effect: &str) -> bool {
+    let is_inertial = TORQUE_CAUSES.iter().any(|cause| cause.name() == effect && cause.is_inertial());
+    ![VISCOUS, COULOMB, UNKNOWN].contains(&effect) && !is_inertial
+}
+
+/// Something at a joint, with the names that explain a part of it.
+fn without_name(joint: usize, left: f64, over: f64, mut names: Vec<TorqueFinding>) -> TorqueFinding {
+    names.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
+    let place = Place::Joint(joint);
+    let known: Vec<&str> = names.iter().map(|finding| finding.effect).collect();
+    let part = match known.is_empty() {
+        true => "no cause that is known explains any of it".into(),
+        false => format!("{} explains a part of it", known.join(" and ").replace('_', " ")),
+    };
+    let statement = format!("something without a name acts at {place}: {over:.1} times the noise is left there; {part}");
+    let mut finding = plain_finding(UNKNOWN, place, statement, Vec::new(), left, 1.0);
+    for name in names {
+        // Names share what the nameless leaves them.
+        let own = TorqueRival { effect: name.effect, place, delta_bic: 0.0, probability: 0.3 * name.probabilities.name };
+        finding.rivals.extend(std::iter::once(own).chain(name.rivals));
+        finding.evidence.gain = finding.evidence.gain.max(name.evidence.gain);
+        finding.evidence.effect_rms = finding.evidence.effect_rms.max(name.evidence.effect_rms);
+        finding.evidence.heldout_gain = finding.evidence.heldout_gain.or(name.evidence.heldout_gain);
+    }
+    let rivals: f64 = finding.rivals.iter().map(|rival| rival.probability).sum();
+    if rivals > 0.0 {
+        let share = 0.4 / rivals.max(0.4);
+        finding.rivals.iter_mut().for_each(|rival| rival.probability *= share);
+        finding.probabilities.name -= rivals * share;
+    }
+    finding
+}
