@@ -8,7 +8,7 @@ use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{dynamic_arm, torque_per_ampere};
 use crate::store::TableRef;
 use crate::store::frame::Frame;
-use crate::table::{Table, TorqueCovariance, TorqueFindings, TorqueParameters, TorqueVerdict};
+use crate::table::{Robot, Table, TorqueCovariance, TorqueFindings, TorqueParameters, TorqueVerdict};
 
 /// The model of torques, and the arm that it is of.
 pub struct IdentifiedTorques {
@@ -65,6 +65,12 @@ impl IdentifiedTorques {
         let mut stages = manifest.stages.iter().filter(writes).filter(|stage| step.is_none_or(|step| stage.id == step));
         let Some(stage) = stages.next_back() else { return Ok(None) };
         let Some(parameters) = written::<TorqueParameters>(stage, &load)? else { return Ok(None) };
+        // A stage behind it may have written the robot once more, with the masses that these torques show.
+        let mut robots = manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(|output| output.kind == Robot::KIND);
+        let read = |table: &TableRef| stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash);
+        let read = robots.rfind(|output| read(&output.table));
+        let read = read.map(|output| Robot::from_frame(&load(&output.table)?)?.to_description()).transpose()?;
+        let robot = read.as_ref().unwrap_or(robot);
         let mut own = Self::of(robot, parameters, format!("run {}, stage {}", manifest.run_id, stage.id))?;
         if let Some(covariance) = written::<TorqueCovariance>(stage, &load)? {
             own.model.covariance = covariance.of_model(&own.model)?;

@@ -148,7 +148,7 @@ impl<'a> Trajectory<'a> {
             };
             let allowed = |value: f64| (!judged.is_refused()).then_some(value);
             needed.torque[own.clone()].iter().for_each(|torque| number(allowed(*torque)));
-            for factors in per_ampere.into_iter() {
+            if let Some(factors) = per_ampere {
                 needed.torque[own.clone()].iter().zip(factors).for_each(|(torque, factor)| number(allowed(torque / factor)));
             }
             needed.u95.iter().flat_map(|all| &all[own.clone()]).for_each(|u95| number(Some(*u95)));

@@ -101,7 +101,7 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     }
     let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual = nearest(&mut steps, 0.5).unwrap_or(0.0);
-    if usual > SLOWEST || usual < FASTEST {
+    if !(FASTEST..=SLOWEST).contains(&usual) {
         let [most, least] = [1.0 / SLOWEST, 1.0 / FASTEST];
         let message =
             format!("rows come at {:.3} Hz, {most:.0} to {least:.0} Hz are allowed: times are in s (milliseconds?)", 1.0 / usual);
