@@ -22,6 +22,12 @@ pub fn ending(path: &Path) -> String {
     path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
+/// Whether two names are of one file that is there.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    let found = |path: &Path| path.canonicalize().ok();
+    found(a).is_some() && found(a) == found(b)
+}
+
 /// Opens a regular file; a folder, a pipe or a device is refused.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();

@@ -252,7 +252,7 @@ fn open(targets: &Path) -> Result<File, Fault> {
 /// Why the targets cannot be written to this file.
 fn misplaced(out: &Path, targets: &Path) -> Option<Fault> {
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let message = if same_file(out, targets) {
+    let message = if raw::same_file(out, targets) {
         "is the targets file itself: name another file".into()
     } else if out.is_dir() {
         format!("{} is a folder: name a file", out.display())
@@ -264,10 +264,6 @@ fn misplaced(out: &Path, targets: &Path) -> Option<Fault> {
         return None;
     };
     Some(Fault::new("--out", message))
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 fn unit(symbol: Option<&str>) -> Option<Unit> {
@@ -394,11 +390,11 @@ fn convert(
 ) -> Result<Unreached> {
     let opened = || open(targets).map_err(|fault| Error::Spec(vec![fault]));
     let mut output = BufWriter::new(output);
-    if columnar {
-        return parquet::stream(opened()?, &mut output, layout, corrector);
+    match columnar {
+        true => parquet::stream(opened()?, &mut output, layout, corrector),
+        false if targets.as_os_str() == "-" => {
+            text::stream(&mut BufReader::new(std::io::stdin()), &mut output, layout, corrector)
+        }
+        false => text::stream(&mut BufReader::new(opened()?), &mut output, layout, corrector),
     }
-    if targets.as_os_str() == "-" {
-        return text::stream(&mut BufReader::new(std::io::stdin()), &mut output, layout, corrector);
-    }
-    text::stream(&mut BufReader::new(opened()?), &mut output, layout, corrector)
 }

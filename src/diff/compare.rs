@@ -13,6 +13,7 @@ use super::measure::{self, CHANGED, CellDifference, CellValue, ComparedTables, S
 use super::source::TableFile;
 use super::{ColumnDiff, DiffOptions, DiffedTable, Discrepancy, Equal, Examples, RowCounts, TableDiff, WorstCell, WorstRow};
 use crate::error::{Error, Result};
+use crate::raw::same_file;
 
 /// Keys shown of rows without a partner.
 const EXAMPLES: usize = 5;
@@ -106,12 +107,6 @@ fn equal(a: &TableFile, b: &TableFile) -> Option<Equal> {
         return Some(Equal::File);
     }
     same_bytes(&a.path, &b.path).then_some(Equal::Bytes)
-}
-
-/// Two names of one file.
-fn same_file(a: &Path, b: &Path) -> bool {
-    let found = |path: &Path| path.canonicalize().ok();
-    found(a).is_some() && found(a) == found(b)
 }
 
 fn schema_findings(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<Vec<Discrepancy>> {

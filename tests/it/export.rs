@@ -176,8 +176,10 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
             assert_ne!(corrected.split('\n').nth(k), text.split('\n').nth(k), "line {k} has a target");
         }
     }
-    let (_, corrected, _) = program("weld.src", KRL);
-    assert!(corrected.contains(",E1 0.0}") && corrected.contains(",S 2,T 4,"), "{corrected}");
+    let (_, corrected, said) = program("weld.src", KRL);
+    // The target stands at A1 0 and A6 0, and its correction takes both below: the turns say so, or they would go once round.
+    assert!(corrected.contains(",E1 0.0}") && corrected.contains(",S 2,T 37,"), "{corrected}");
+    assert!(said.contains("posture S 2, T 37 of the corrected joints, was S 2, T 4"), "{said}");
 }
 
 #[test]

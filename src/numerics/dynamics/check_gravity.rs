@@ -80,7 +80,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
 
 /// Another reading of the recorded angles.
 #[derive(Clone, Copy)]
-enum Reading {
+enum AngleReading {
     /// As they stand.
     Straight,
     Scaled(f64),
@@ -93,23 +93,25 @@ enum Reading {
 /// What is wrong with the angles, where another reading of them explains the torques far better.
 fn angle_fault(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -> Option<Fault> {
     let n = recording.joints;
-    let straight = unexplained(arm, recording, theta, Reading::Straight);
+    let straight = unexplained(arm, recording, theta, AngleReading::Straight);
     let pairs = || (0..n).flat_map(|one| (one + 1..n).map(move |other| (one, other)));
-    let others = [Reading::Scaled(1.0 / DEGREE), Reading::Scaled(DEGREE)]
+    let others = [AngleReading::Scaled(1.0 / DEGREE), AngleReading::Scaled(DEGREE)]
         .into_iter()
-        .chain(pairs().map(|(one, other)| Reading::Exchanged(one, other)))
-        .chain(pairs().map(|(one, other)| Reading::Renamed(one, other)));
+        .chain(pairs().map(|(one, other)| AngleReading::Exchanged(one, other)))
+        .chain(pairs().map(|(one, other)| AngleReading::Renamed(one, other)));
     let left = others.map(|reading| (reading, unexplained(arm, recording, theta, reading)));
     let (best, left) = left.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (left < EXCHANGED * straight).then(|| {
         let better = (straight / left.max(f64::MIN_POSITIVE)).sqrt();
         let said = match best {
-            Reading::Scaled(factor) if factor > 1.0 => {
+            AngleReading::Scaled(factor) if factor > 1.0 => {
                 "angles were radians already and were converted from degrees once more".into()
             }
-            Reading::Straight | Reading::Scaled(_) => "angles are degrees where radians are expected".into(),
-            Reading::Exchanged(one, other) => format!("the angles of joint {} and joint {} look exchanged", one + 1, other + 1),
-            Reading::Renamed(one, other) => format!("joint {} and joint {} look exchanged", one + 1, other + 1),
+            AngleReading::Straight | AngleReading::Scaled(_) => "angles are degrees where radians are expected".into(),
+            AngleReading::Exchanged(one, other) => {
+                format!("the angles of joint {} and joint {} look exchanged", one + 1, other + 1)
+            }
+            AngleReading::Renamed(one, other) => format!("joint {} and joint {} look exchanged", one + 1, other + 1),
         };
         Fault::new("position", format!("{said}: the declared masses explain the torques {better:.0} times better so"))
     })
@@ -140,7 +142,7 @@ impl JointSums {
 }
 
 /// Mean square of what gravity leaves of the torques about their means, Nm^2.
-fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], reading: Reading) -> f64 {
+fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], reading: AngleReading) -> f64 {
     let n = recording.joints;
     let mut dynamics = InverseDynamics::new(arm);
     let (still, mut gravity, mut position) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -149,10 +151,10 @@ fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], rea
         position.copy_from_slice(&recording.position[row * n..(row + 1) * n]);
         let mut torque = recording.torque[row * n..(row + 1) * n].to_vec();
         match reading {
-            Reading::Straight => (),
-            Reading::Scaled(factor) => position.iter_mut().for_each(|angle| *angle *= factor),
-            Reading::Exchanged(one, other) => position.swap(one, other),
-            Reading::Renamed(one, other) => {
+            AngleReading::Straight => (),
+            AngleReading::Scaled(factor) => position.iter_mut().for_each(|angle| *angle *= factor),
+            AngleReading::Exchanged(one, other) => position.swap(one, other),
+            AngleReading::Renamed(one, other) => {
                 position.swap(one, other);
                 torque.swap(one, other);
             }
@@ -168,6 +170,6 @@ fn unexplained(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64], rea
             sums.product += torque * gravity;
         }
     }
-    let scaled = |joint: usize| matches!(reading, Reading::Renamed(one, other) if recording.from_current && (joint == one || joint == other));
+    let scaled = |joint: usize| matches!(reading, AngleReading::Renamed(one, other) if recording.from_current && (joint == one || joint == other));
     sums.iter().enumerate().map(|(joint, sums)| sums.left(rows, scaled(joint))).sum::<f64>() / rows
 }
