@@ -8,6 +8,10 @@ use std::f64::consts::PI;
 /// G tau - tau with G = (2 z w s + w^2) / (s^2 + 2 z w s + w^2); shape: Hz and z.
 pub(super) struct Elasticity;
 
+/// Least share of the rigid arm's torque that swings: all of it does, and at resonances (Hz) beyond what was filtered only the ratio of the
+/// share to the resonance squared is seen.
+const SWINGING: f64 = 0.5;
+const SEEN: f64 = 15.0;
 const HERTZ: [f64; 8] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0];
 const DAMPING: [f64; 2] = [0.05, 0.15];
 
@@ -28,6 +32,10 @@ impl TorqueCause for Elasticity {
 
     fn is_positive(&self) -> bool {
         true
+    }
+
+    fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
+        form.shape[0] > SEEN || values.iter().all(|share| *share >= SWINGING)
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
