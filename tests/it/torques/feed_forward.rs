@@ -1,6 +1,7 @@
 //! Torques that are fed forward say how certain they are, and what is not certain is refused: a wrong number moves a robot.
 
 use super::results::{Solved, arm, calib, column, motion, solve, solved};
+use crate::compensate::concealed::from_environment;
 use calib::twin::torque::TorqueCase;
 use std::path::Path;
 use std::process::Output;
@@ -76,11 +77,10 @@ fn the_uncertainty_of_a_torque_covers_the_truth_of_fresh_motions() {
     assert!(shares[1] > 0.3, "{shares:.2?}");
 }
 
-/// Over several arms; says more than it asks. `cargo test --test it -- torques::feed_forward --ignored --nocapture`
+/// `CALIB_RECORDINGS=12 cargo test --test it -- torques::feed_forward --nocapture` prints the figures of the README.
 #[test]
-#[ignore = "takes minutes: a measurement"]
 fn the_uncertainty_of_torques_covers_the_truth_of_several_arms() {
-    let cases: Vec<TorqueCase> = super::results::cases(12);
+    let cases: Vec<TorqueCase> = super::results::cases(from_environment("CALIB_RECORDINGS", 2) as usize);
     let mut all = Vec::new();
     for case in cases {
         let name = format!("{} {}", case.name, case.robot.name);
