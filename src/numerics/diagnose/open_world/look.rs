@@ -68,8 +68,6 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     pool: &'l CachedHypotheses<'a>,
     around: AroundGroups<'l, 'v>,
     groups: Vec<PlaceGroups>,
-    /// By how much the noise is larger, in squares, than stated.
-    pub louder: f64,
     scale: f64,
     whole: KnownCauses<'l>,
     beside: SurveyedPlaces,
@@ -77,28 +75,22 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
 }
 
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
-    /// `before` is by how much the look before this one saw a larger noise than stated, 1 at first.
-    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, before: f64) -> Self {
+    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
         let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without };
         let all = groups_of_places(&around);
-        let stated = 1.0 / sight.frame.view.autocorrelation_time();
-        let mut scale = stated / before;
+        let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
-        let (seen, least) =
-            (louder(&sight.frame, &whole, beside.best.first(), stated, sight.fitter), sight.fitter.least_of_the_noise());
-        let seen = seen.max(least);
-        let mut louder = if seen > LOUDER || seen < 1.0 / LOUDER && least < 1.0 { seen } else { 1.0 };
-        if (1.0 / LOUDER..=LOUDER).contains(&(louder / before)) {
-            louder = before;
-        } else {
-            scale = stated / louder;
+        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
+        let louder = louder.max(sight.fitter.least_of_the_noise());
+        if louder > LOUDER || louder < 1.0 / LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
+            scale /= louder;
             whole = sight.state(&|_| true, scale);
             beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         }
         let findings = groups(&sight.judged.state, &sight.judged.set, pool, survey);
-        Self { sight, pool, around, groups: all, louder, scale, whole, beside, findings }
+        Self { sight, pool, around, groups: all, scale, whole, beside, findings }
     }
 
     fn case(&self) -> NameCase<'_, 'l, 'v, 'a> {
@@ -202,10 +194,9 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
 }
 
 /// By how much the noise is larger, in squares, than what repeats and statements say: what the richest model leaves, repeats weighing in.
-fn louder(frame: &ProjectedRows, whole: &KnownCauses, richest: Option<&FreeForm>, stated: f64, fitter: &Fitter) -> f64 {
-    let explained = (whole.gain() + richest.map_or(0.0, |form| form.gain)) * stated / whole.scale();
-    let left = frame.square() * stated - explained;
+fn louder(frame: &ProjectedRows, whole: &KnownCauses, richest: Option<&FreeForm>, scale: f64, fitter: &Fitter) -> f64 {
+    let left = frame.square() * scale - whole.gain() - richest.map_or(0.0, |form| form.gain);
     let repeats = 3.0 * fitter.repeatability.repeats as f64;
-    let freedom = (frame.residual_rows().saturating_sub(frame.rank())) as f64 * stated;
+    let freedom = (frame.residual_rows().saturating_sub(frame.rank())) as f64 * scale;
     (repeats + left.max(0.0)) / (repeats + freedom).max(1.0)
 }

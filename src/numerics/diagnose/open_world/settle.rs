@@ -32,15 +32,14 @@ pub(crate) fn settle(
 ) -> Settled {
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
-    let (mut asked_alone, mut louder) = (false, 1.0);
+    let mut asked_alone = false;
     for round in 0..=ROUNDS {
         tell(of_the_open_world(&judged.state));
         let view = RoundView::of(&judged.state, fitter);
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {
             let sight = Sighted::of(&view, &judged, fitter);
-            let look = OpenWorldLook::of(&sight, pool, survey, louder);
-            louder = look.louder;
+            let look = OpenWorldLook::of(&sight, pool, survey);
             if round < ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }

@@ -130,11 +130,6 @@ impl<'c> KnownCauses<'c> {
         left.data.into()
     }
 
-    /// Over the variance of the noise, in the variances of the rows.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// ln of the evidence over that of noise alone.
     pub fn log(&self) -> f64 {
         let determinant: f64 = (0..self.lower.nrows()).map(|k| self.lower[(k, k)].ln()).sum();
