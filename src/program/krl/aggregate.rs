@@ -183,18 +183,7 @@ impl<'t> Aggregate<'t> {
             [None, None] => PostureStatement::Unstated,
             [status, turn] => PostureStatement::StatusTurn { status, turn },
         };
-        found.literals.push(Literal {
-            kind,
-            values,
-            spans,
-            external,
-            posture,
-            posture_spans,
-            frame: None,
-            tool: None,
-            tool_in_force: None,
-            payload: None,
-        });
+        found.literals.push(Literal::read(kind, (values, spans), external, (posture, posture_spans)));
     }
 
     /// Name and number of a field; status and turn may be bit patterns.

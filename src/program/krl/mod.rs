@@ -89,10 +89,10 @@ fn in_force(
     let others: Vec<Vec<Token>> = companions.iter().map(read).collect();
     let (mut data, mut reached) = (SystemData::default(), Reached::default());
     let companions = || companions.iter().zip(&others);
-    for (companion, tokens) in companions() {
-        data.declare(companion.text(Language::Krl), &lines(tokens));
-        data.declare_routines(companion.text(Language::Krl), &lines(tokens));
-    }
+    let read: Vec<(ProgramText, Vec<&[Token]>)> =
+        companions().map(|(companion, tokens)| (companion.text(Language::Krl), lines(tokens))).collect();
+    read.iter().for_each(|(source, lines)| data.declare(*source, lines));
+    data.declare_routines(&read);
     data.declare(source, own);
     reached::reach(source, own, &data, None, &mut reached);
     for (companion, tokens) in companions() {

@@ -18,6 +18,9 @@ use std::collections::BTreeMap;
 /// Calls of `BAS` that put the data of a point in force.
 const OF_A_POINT: [&str; 5] = ["FRAMES", "PTP_PARAMS", "CP_PARAMS", "PTP_DAT", "CP_DAT"];
 
+/// Heads of lines that name a routine and do not call it.
+const DECLARING: [&str; 7] = ["DEF", "DEFFCT", "GLOBAL", "EXT", "EXTFCT", "EXTP", "EXTFCTP"];
+
 /// What an inline form says of its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PointData {
@@ -113,13 +116,24 @@ impl SystemData {
         }
     }
 
-    /// Adds the routines of another file.
-    pub fn declare_routines(&mut self, source: ProgramText, lines: &[&[Token]]) {
+    /// Adds the routines of other files. What a routine calls may be declared behind it, or in a file behind its own: all are read until no
+    /// further one is found to set anything.
+    pub fn declare_routines(&mut self, files: &[(ProgramText, Vec<&[Token]>)]) {
+        loop {
+            let before = self.routines.clone();
+            files.iter().for_each(|(source, lines)| self.declare_routines_of(*source, lines));
+            if self.routines == before {
+                return;
+            }
+        }
+    }
+
+    fn declare_routines_of(&mut self, source: ProgramText, lines: &[&[Token]]) {
         let mut inside: Option<String> = None;
         for line in lines {
             match step(source, line) {
                 FlowStep::Routine(name) => {
-                    self.routines.insert(name.clone(), false);
+                    self.routines.entry(name.clone()).or_insert(false);
                     inside = Some(name);
                 }
                 _ if self.sets(source, line) => {
@@ -135,13 +149,16 @@ impl SystemData {
     /// Whether a line sets what is in force.
     pub fn sets(&self, source: ProgramText, line: &[Token]) -> bool {
         const SET: [&str; 7] = ["$BASE", "$TOOL", "$LOAD", "$IPO_MODE", "$ROBROOT", "FDAT_ACT", "BAS"];
-        source.is_word(&line[0], &SET) || self.called(source, line) == Some(true)
+        source.is_word(&line[0], &SET) || self.called(source, line).is_some()
     }
 
-    /// Whether a line calls a routine of another file, and that one sets what is in force.
-    fn called(&self, source: ProgramText, line: &[Token]) -> Option<bool> {
-        let call = line.len() > 2 && line[0].sort == TokenKind::Word && line[1].is(b'(');
-        self.routines.get(&source.upper(&line[0])).copied().filter(|_| call)
+    /// The routine of another file that a line calls, by itself or within an expression, where that one sets what is in force.
+    fn called(&self, source: ProgramText, line: &[Token]) -> Option<String> {
+        if source.is_word(&line[0], &DECLARING) {
+            return None;
+        }
+        let calls = line.windows(2).filter(|w| w[0].sort == TokenKind::Word && w[1].is(b'('));
+        calls.map(|w| source.upper(&w[0])).find(|name| self.routines.get(name) == Some(&true))
     }
 
     /// The routine that a line calls and that no file that was read has.
@@ -155,8 +172,7 @@ impl SystemData {
     pub fn take(&self, source: ProgramText, line: &[Token], place: &str, state: &mut SystemState) {
         if source.is_word(&line[0], &["BAS"]) {
             self.call(source, line, place, state);
-        } else if self.called(source, line) == Some(true) {
-            let name = source.upper(&line[0]);
+        } else if let Some(name) = self.called(source, line) {
             state.force = InForce::open(&format!("is set by {name}, a routine of another file ({place})"));
         } else {
             self.set(source, line, place, state);

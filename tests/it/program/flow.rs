@@ -136,6 +136,24 @@ fn routines_of_other_files_leave_frames_as_they_are_or_are_read() {
 }
 
 #[test]
+fn what_a_routine_of_another_file_sets_by_one_that_it_calls_is_not_taken_as_left() {
+    let one = base(100.0);
+    let text = format!("DEF MAIN()\n{one}\nPART(1)\n{MOTION}\nEND\n");
+    let (caller, setter) = ("DEF PART(N:IN)\nFIXTURE()\nEND\n", "DEF FIXTURE()\n$BASE=$NULLFRAME\nEND\n");
+    let is_refused = |companions: &[(&str, &str)], text: &str, name: &str| {
+        let (_, frames) = read(text, companions);
+        assert!(frames.first().is_some_and(|frame| frame.contains(&format!("its $BASE is set by {name}"))), "{frames:?}");
+    };
+    // In whatever order they stand.
+    is_refused(&[("part.src", caller), ("fixture.src", setter)], &text, "PART");
+    is_refused(&[("fixture.src", setter), ("part.src", caller)], &text, "PART");
+    is_refused(&[("part.src", &format!("{caller}{setter}"))], &text, "PART");
+    // Within an expression.
+    let asked = format!("DEF MAIN()\n{one}\nIF CLAMPED(1) THEN\n{MOTION}\nENDIF\nEND\n");
+    is_refused(&[("clamped.src", "DEFFCT BOOL CLAMPED(N:IN)\n$BASE=$NULLFRAME\nRETURN TRUE\nENDFCT\n")], &asked, "CLAMPED");
+}
+
+#[test]
 fn loads_follow_the_program() {
     let payloads = |text: &str| followed_loads(text);
     assert_eq!(payloads(&format!("$LOAD={{M 4}}\n{MOTION}\n$LOAD={{M 5}}\n{MOTION}\n")), [Some(4.0), Some(5.0)]);
