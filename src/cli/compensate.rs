@@ -36,7 +36,7 @@ use std::path::{Path, PathBuf};
 /// and the files of --with. The tool is taken as the robot file's where the program has one, and --tool says which it is where it has several.
 /// What is not known so, is computed when the program runs, or moves (conveyors, tools that stand still) is refused (--assume-frames), and so
 /// are programs and tables without a payload where the model depends on load: of RAPID it is the mass of the motion's tool (tooldata, or
-/// \\TLoad), of KRL that of $LOAD in force; --payload overrules it. Routines of files that were not read are taken to set nothing.
+/// \TLoad), of KRL that of $LOAD in force; --payload overrules it. Routines of files that were not read are taken to set nothing.
 /// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
 /// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
 /// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program

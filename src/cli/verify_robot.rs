@@ -2,7 +2,7 @@
 
 use super::model_arguments::ModelArguments;
 use super::{emit_json, emit_lines, write};
-use crate::compensate::{CorrectionOptions, Corrector, Gate, IdentifiedArm, load_matters};
+use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm, load_matters};
 use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
@@ -70,20 +70,8 @@ pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) 
     let nominal = RobotModel::new(identified.robot.clone());
     let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
     let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
-    let options = CorrectionOptions {
-        convention,
-        cartesian: false,
-        oriented: false,
-        one_step: false,
-        payload: arguments.payload.unwrap_or(0.0),
-        temperature: None,
-        time: None,
-        clock,
-        direction: None,
-        start: None,
-        uncertainty: true,
-        gate: Gate::default(),
-    };
+    let payload = arguments.payload.unwrap_or(0.0);
+    let options = CorrectionOptions { payload, clock, ..CorrectionOptions::counted_by(convention) };
     let mut corrector = Corrector::new(&arm, identified.coverage(), identified.uncertainty(&arm), options);
     let found = achieved(&arm, &nominal, &mut corrector, &rows, arguments.new_base)?;
     if let Some(path) = &arguments.html {

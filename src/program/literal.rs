@@ -44,6 +44,17 @@ pub struct Literal {
 }
 
 impl Literal {
+    /// As it is read; what is in force at it follows from the whole program.
+    pub(super) fn read(
+        kind: TargetKind,
+        (values, spans): (Vec<f64>, Vec<Range<usize>>),
+        external: Vec<Option<f64>>,
+        (posture, posture_spans): (PostureStatement, Vec<Range<usize>>),
+    ) -> Self {
+        let (frame, tool, tool_in_force, payload) = (None, None, None, None);
+        Self { kind, values, spans, external, posture, posture_spans, frame, tool, tool_in_force, payload }
+    }
+
     /// Angles and lengths that no robot has, at their bytes.
     pub(super) fn beyond_any_robot(&self) -> impl Iterator<Item = (usize, String)> {
         let placed = self.values.iter().zip(&self.spans).enumerate();

@@ -16,7 +16,7 @@ pub(super) struct Reached {
     pub placed: Vec<(Range<usize>, InForce)>,
     /// Names that are used otherwise than by motions.
     pub mentioned: BTreeMap<String, InForce>,
-    /// What was taken for granted of other files, at the bytes of the file that is corrected.
+    /// What was assumed of other files, at the bytes of the file that is corrected.
     pub assumed: Vec<(usize, String)>,
 }
 

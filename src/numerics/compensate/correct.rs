@@ -73,6 +73,26 @@ pub struct CorrectionOptions {
     pub gate: Gate,
 }
 
+impl CorrectionOptions {
+    /// Of targets that say all there is, with joints counted so.
+    pub fn counted_by(convention: JointConvention) -> Self {
+        Self {
+            convention,
+            cartesian: false,
+            oriented: false,
+            one_step: false,
+            payload: 0.0,
+            temperature: None,
+            time: None,
+            clock: false,
+            direction: None,
+            start: None,
+            uncertainty: true,
+            gate: Gate::default(),
+        }
+    }
+}
+
 /// Corrects targets in their order: what a target does not say follows from the one before.
 pub struct Corrector<'a> {
     arm: &'a IdentifiedArm,

@@ -217,7 +217,7 @@ mod tests {
             // Up to what is kept off the limit.
             assert!(distance(&theta, &step, &covariance) > cost * (1.0 - 1e-5));
         }
-        // What goes with the rod moves with it.
+        // Numbers that are correlated with those of the rod move, too.
         assert!(found.theta[10..].iter().zip(&theta[10..]).any(|(a, b)| (a - b).abs() > 1e-6));
     }
 

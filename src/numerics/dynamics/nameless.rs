@@ -64,7 +64,7 @@ pub(super) fn unname(choice: &CauseChoice, residual: &[Vec<f64>], found: &mut Ve
     }
 }
 
-/// Whether a name stands for something beside the friction that hardly a joint is without, and no wrong mass.
+/// Whether a name is of neither viscous nor Coulomb friction, which nearly every joint has, nor of a wrong mass.
 fn is_judged(effect: &str) -> bool {
     let is_inertial = TORQUE_CAUSES.iter().any(|cause| cause.name() == effect && cause.is_inertial());
     ![VISCOUS, COULOMB, UNKNOWN].contains(&effect) && !is_inertial

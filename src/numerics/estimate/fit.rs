@@ -178,7 +178,7 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
         excess_sigma: problem.excess.length,
         excess_sigma_angle: has_angles.then_some(problem.excess.angle),
         values: errors.iter().map(|(_, axes)| axes).sum(),
-        noise_scale: scale,
+        noise_scale: 1.0 / weight,
         covariance,
         prior_checks,
         repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),

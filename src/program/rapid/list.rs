@@ -186,18 +186,7 @@ impl<'t> List<'t> {
             }
         }
         let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal {
-            kind,
-            values,
-            spans,
-            external,
-            posture,
-            posture_spans,
-            frame: None,
-            tool: None,
-            tool_in_force: None,
-            payload: None,
-        });
+        found.literals.push(Literal::read(kind, (values, spans), external, (posture, posture_spans)));
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {

@@ -4,7 +4,7 @@
 
 use crate::desk::{Desk, table};
 use calib::compensate::{
-    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, Gate, IdentifiedArm, Scatter, Uncertainty,
+    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, IdentifiedArm, Scatter, Uncertainty,
 };
 use calib::description::RobotDescription;
 use calib::effect::Load;
@@ -97,18 +97,8 @@ pub fn outcomes_at(case: &Case, (targets, outside): (Vec<Point>, Vec<bool>)) -> 
     let data = recording.measurements();
 
     let options = || CorrectionOptions {
-        convention: JointConvention::of_the_robot_file(robot.joints.len()),
-        cartesian: false,
-        oriented: false,
-        one_step: false,
-        payload: 0.0,
-        temperature: None,
-        time: None,
         clock: data.has_clock(),
-        direction: None,
-        start: None,
-        uncertainty: true,
-        gate: Gate::default(),
+        ..CorrectionOptions::counted_by(JointConvention::of_the_robot_file(robot.joints.len()))
     };
     let uncertainty = covariance.map(|covariance| Uncertainty::new(&arm, covariance, scatter).beside(&arm, &data));
     let mut corrector = Corrector::new(&arm, Some(Coverage::of(&data)), uncertainty, options());

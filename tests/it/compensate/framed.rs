@@ -1,5 +1,5 @@
 //! Programs with several frames and tools: every target stands in the frame, and is reached with the tool, that is in force where it is moved
-//! to. The true robot goes where it goes with the same targets as joints.
+//! to. The true robot goes to the same points as with the targets stated as joints.
 
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};

@@ -2,7 +2,7 @@
 
 use super::maker::{Maker, makers};
 use super::{ROBOT, calib, cell};
-use calib::compensate::{CommandTarget, CorrectionOptions, Corrector, Gate, IdentifiedArm, StatedPosture};
+use calib::compensate::{CommandTarget, CorrectionOptions, Corrector, IdentifiedArm, StatedPosture};
 use calib::effect::EffectStack;
 use calib::estimate::Model;
 use calib::robot::RobotModel;
@@ -46,20 +46,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
                     ..CommandTarget::default()
                 }
             };
-            let manner = CorrectionOptions {
-                convention: maker.convention(),
-                cartesian: true,
-                oriented: false,
-                one_step: false,
-                payload: 0.0,
-                temperature: None,
-                time: None,
-                clock: false,
-                direction: None,
-                start: None,
-                uncertainty: true,
-                gate: Gate::default(),
-            };
+            let manner = CorrectionOptions { cartesian: true, ..CorrectionOptions::counted_by(maker.convention()) };
             let answers = Corrector::new(&arm, None, None, manner).batch(poses.iter().map(target).collect());
             answers.into_iter().map(|answer| answer.q.map(|q| q.iter().map(|q| q.to_degrees()).collect())).collect()
         };

@@ -52,18 +52,10 @@ impl Trip {
         tool: Option<RobotTool>,
     ) -> Result<Rewritten, String> {
         let manner = CorrectionOptions {
-            convention: maker.convention(),
-            cartesian: false,
             oriented: true,
-            one_step: false,
-            payload: 0.0,
-            temperature: None,
-            time: None,
-            clock: false,
-            direction: None,
-            start: None,
             uncertainty: false,
             gate: Gate { insisted: true, ..Gate::default() },
+            ..CorrectionOptions::counted_by(maker.convention())
         };
         let mut corrector = Corrector::new(&self.arm, None, None, manner);
         let rules = ProgramRules { partial: Partial::Refused, frames: Frames::Refused, load: ProgramLoad::Optional, tool };

@@ -1,5 +1,5 @@
 //! Programs state every posture of a spherical wrist: status and turn of KRL, confdata of RAPID, in the controller's counting. With them the
-//! true robot goes where it goes with the same targets as joints.
+//! true robot goes to the same points as with the targets stated as joints.
 
 use super::maker::{Maker, PLAIN, makers};
 use super::round_trip::{Trip, pose, read};

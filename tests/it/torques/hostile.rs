@@ -181,10 +181,10 @@ const SPOILED: [Spoiled; 12] = [
         &["joint 2 and joint 3 look exchanged"],
     ),
     ("compact6", "another sign", |sheet| sheet.change(&["i2_a".into()], |x| -x), 10, &["joint 2", "the other sign"]),
-    ("compact6", "radians taken for degrees", |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_radians), 10, &["radians"]),
+    ("compact6", "radians declared as degrees", |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_radians), 10, &["radians"]),
     (
         "compact6",
-        "degrees taken for radians",
+        "degrees declared as radians",
         |sheet| sheet.change(&each("q{j}_deg", 6), f64::to_degrees),
         10,
         &["q2_deg", "allowed: -1145.9"],
