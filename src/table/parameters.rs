@@ -28,9 +28,7 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{
-    AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, JointCompliance, Load, ToolOffset, identified, whole,
-};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, names, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
@@ -205,7 +203,7 @@ impl Parameters {
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
     pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let compliance = self.0.iter().find(|row| row.effect == JointCompliance::NAME && row.form.is_none());
+        let compliance = self.0.iter().find(|row| row.effect == names::JOINT_COMPLIANCE && row.form.is_none());
         let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
         let robot = self.with_setup(robot);
         let setting = EffectContext { base, load };
@@ -218,8 +216,8 @@ impl Parameters {
         let targets = !robot.setup().targets.is_empty();
         // Where these stand is their start: nothing is left to correct.
         let stands = |row: &ParameterRow| match row.effect.as_str() {
-            BaseFrame::NAME | AnchorShift::NAME => true,
-            effect => targets && effect == ToolOffset::NAME,
+            names::BASE_FRAME | names::ANCHOR => true,
+            effect => targets && effect == names::TOOL_OFFSET,
         };
         for row in self.0.iter().filter(|row| !stands(row)) {
             let position = model.stack.specs().iter().position(|spec| spec.name == row.name);
@@ -237,13 +235,13 @@ impl Parameters {
     /// The robot with the targets and anchors that the parameters place.
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors = self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| self.anchor(name, &stand));
+        let anchors = self.placed(names::ANCHOR).into_iter().map(|(name, stand)| self.anchor(name, &stand));
         let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
             self.0.iter().any(|row| row.name == rx)
         };
-        let targets = self.placed(ToolOffset::NAME);
+        let targets = self.placed(names::TOOL_OFFSET);
         if targets.keys().any(|name| !name.is_empty()) || turned("") {
             let target = |(name, stand): (String, Pose)| Target {
                 seat: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
@@ -293,7 +291,7 @@ impl Parameters {
         let (translation, rotation) = (base.translation, base.rotation_vector());
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
-                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
+                let name = format!("{}.{ending}{name}", names::BASE_FRAME);
                 self.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
             }
         }
@@ -303,7 +301,7 @@ impl Parameters {
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.
     pub fn base_pose(&self) -> Pose {
         let value = |axis: &str, unit: Unit| {
-            let name = format!("{}.{axis}", BaseFrame::NAME);
+            let name = format!("{}.{axis}", names::BASE_FRAME);
             self.0.iter().find(|row| row.name == name).map_or(0.0, |row| unit.to_si(row.value))
         };
         let translation = ["x", "y", "z"].map(|axis| value(axis, Unit::Millimetre));

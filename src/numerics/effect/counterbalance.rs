@@ -3,18 +3,14 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, names};
 
 pub struct Counterbalance;
-
-impl Counterbalance {
-    pub const NAME: &'static str = "counterbalance";
-}
 
 impl Cause for Counterbalance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::COUNTERBALANCE,
             place: "joint 2 or 3",
             formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
             size: "10 to 60 % of the gravity torque",
@@ -31,13 +27,13 @@ impl Cause for Counterbalance {
         format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
+    fn absorbs_residual(&self) -> &'static [&'static str] {
         FINER
     }
 
     /// The torque of a link about its own joint is of first order in that joint's angle, as a balancer's; a hose pulls by it too.
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        let mut out = vec![("cable_drag", form.place())];
+        let mut out = vec![(names::CABLE_DRAG, form.place())];
         out.extend(Spring::identities(form));
         out
     }

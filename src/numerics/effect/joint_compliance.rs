@@ -6,7 +6,7 @@
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, ParameterSpec, Place, Placed,
-    Summary, Survey, Variable,
+    Summary, Survey, Variable, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -14,15 +14,10 @@ use serde::{Deserialize, Serialize};
 /// Wind-up of joints by their load.
 pub struct JointCompliance;
 
-impl JointCompliance {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_compliance";
-}
-
 impl Cause for JointCompliance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_compliance",
+            name: names::JOINT_COMPLIANCE,
             place: "joint",
             formula: "d = c t",
             size: "0.1 to 10 urad/Nm",
@@ -63,8 +58,8 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
@@ -106,7 +101,7 @@ impl Windup {
 
 impl Effect for Windup {
     fn name(&self) -> &'static str {
-        JointCompliance::NAME
+        names::JOINT_COMPLIANCE
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -3,8 +3,8 @@
 use super::form::parameters;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Backlash, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed,
-    Summary, Survey, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, NamedForms, ParameterSpec, Place, Placed,
+    Summary, Survey, Variable, figure, names,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -13,11 +13,6 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Wind-up that is not in proportion to the load.
 pub struct JointHardening;
-
-impl JointHardening {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_hardening";
-}
 
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,7 +52,7 @@ const FLAT: f64 = 0.1;
 impl Cause for JointHardening {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_hardening",
+            name: names::JOINT_HARDENING,
             place: "joint",
             formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
             size: "5 to 50 % of the wind-up",
@@ -97,8 +92,17 @@ impl Cause for JointHardening {
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["backlash", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::BACKLASH, names::UNKNOWN]
+    }
+
+    /// A joint has one wind-up.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
+    }
+
+    fn simpler(&self) -> Option<&'static str> {
+        Some(names::JOINT_COMPLIANCE)
     }
 
     fn impossible(&self, form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
@@ -113,7 +117,7 @@ impl Cause for JointHardening {
     }
 
     fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
-        if called == Backlash::NAME { vec![(Self::NAME, form.place())] } else { Vec::new() }
+        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, form.place())] } else { Vec::new() }
     }
 
     /// From a wind-up in proportion.
@@ -182,7 +186,7 @@ impl BentWindup {
 
 impl Effect for BentWindup {
     fn name(&self) -> &'static str {
-        JointHardening::NAME
+        names::JOINT_HARDENING
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -259,7 +263,7 @@ impl Placed for BentWindup {
     }
 
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        if self.is_lost_motion(p, survey.load(self.joint)) { Backlash::NAME } else { JointHardening::NAME }
+        if self.is_lost_motion(p, survey.load(self.joint)) { names::BACKLASH } else { names::JOINT_HARDENING }
     }
 
     fn body(&self) -> serde_json::Value {

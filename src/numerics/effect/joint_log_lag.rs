@@ -3,8 +3,8 @@
 
 use super::form::parameters;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, HiddenSize, Hypothesis, NamedForms, ParameterSpec, Place,
+    Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -12,11 +12,6 @@ use serde::{Deserialize, Serialize};
 
 /// Joints logged before or after the point was measured.
 pub struct JointLogLag;
-
-impl JointLogLag {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_log_lag";
-}
 
 /// What the lag is in proportion to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,10 +37,15 @@ pub struct Lag {
 /// s: clocks farther apart belong to other postures altogether.
 const LARGEST: f64 = 0.3;
 
+/// s: clocks that are apart by less are no cause to measure again.
+const CLOCKS: f64 = 1e-3;
+/// A backlash of less than this share of a lag's gain is a trace of the lag.
+const TRACE: f64 = 0.05;
+
 impl Cause for JointLogLag {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_log_lag",
+            name: names::JOINT_LOG_LAG,
             place: "recording",
             formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
             size: "0.1 to 5 % of the move; 0.5 to 20 ms",
@@ -96,6 +96,16 @@ impl Cause for JointLogLag {
         }
     }
 
+    /// A backlash follows the side of the last move, too.
+    fn absorbs_below(&self, _own: &NamedForms, part: &NamedForms) -> Option<f64> {
+        (part.name == names::BACKLASH).then_some(TRACE)
+    }
+
+    fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
+        let clocks = form.variables() == [Variable::Speed];
+        clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: CLOCKS, unit: Unit::Millisecond })
+    }
+
     /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
     fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         let lag: &Lag = form.as_a()?;
@@ -118,7 +128,7 @@ impl Cause for JointLogLag {
 
 impl Effect for Lag {
     fn name(&self) -> &'static str {
-        JointLogLag::NAME
+        names::JOINT_LOG_LAG
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -4,7 +4,7 @@ use super::form::parameters;
 use super::motion::{SHORT, extent};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable,
+    Variable, names,
 };
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -14,11 +14,6 @@ use serde::{Deserialize, Serialize};
 
 /// Links that bend under the moment at their far joint.
 pub struct LinkCompliance;
-
-impl LinkCompliance {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "link_compliance";
-}
 
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,9 +41,13 @@ const UNLIKELY: f64 = 10.0;
 const RARER: f64 = 4.0;
 
 impl Cause for LinkCompliance {
+    fn stands_in_for_two(&self) -> bool {
+        true
+    }
+
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_compliance",
+            name: names::LINK_COMPLIANCE,
             place: "link",
             formula: "the link bends about its far joint, by the moment there",
             size: "0.05 to 1 urad/Nm",
@@ -82,7 +81,7 @@ impl Cause for LinkCompliance {
 
 impl Effect for BentLink {
     fn name(&self) -> &'static str {
-        LinkCompliance::NAME
+        names::LINK_COMPLIANCE
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -4,7 +4,7 @@ use super::form::parameters;
 use super::spring::{MEASURE, Spring};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
-    Survey, Variable,
+    Survey, Variable, names,
 };
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -24,7 +24,7 @@ pub struct WrongLinkMass {
 impl Cause for LinkMass {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_mass",
+            name: names::LINK_MASS,
             place: "link",
             formula: "mass and first moments of a link in the torque model",
             size: "3 to 20 %",
@@ -49,7 +49,7 @@ impl Cause for LinkMass {
 
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
         match form.place() {
-            Place::Links(link, _) if Spring::balances(link) => vec![("counterbalance", Place::Joint(link))],
+            Place::Links(link, _) if Spring::balances(link) => vec![(names::COUNTERBALANCE, Place::Joint(link))],
             _ => Vec::new(),
         }
     }

@@ -4,7 +4,9 @@
 //! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
 
 use super::form::parameters;
-use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable};
+use super::{
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable, names,
+};
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -16,7 +18,7 @@ pub(super) const MEASURE: Measure = Measure {
 };
 
 /// What its own shape may leave at the same joint.
-pub(super) const FINER: &[&str] = &["gear_cyclic", "unknown", "joint_table", "backlash"];
+pub(super) const FINER: &[&str] = &[names::GEAR_CYCLIC, names::UNKNOWN, names::JOINT_TABLE, names::BACKLASH];
 
 /// Under the name of a cause.
 #[derive(Clone)]
@@ -66,9 +68,9 @@ impl Spring {
 
     /// The torque of a link about its own joint is of first order in that joint's angle.
     pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
-        let mut out = vec![("gear_cyclic", form.place())];
+        let mut out = vec![(names::GEAR_CYCLIC, form.place())];
         if let Place::Joint(joint) = form.place() {
-            out.push(("link_mass", Place::Links(joint, joint)));
+            out.push((names::LINK_MASS, Place::Links(joint, joint)));
         }
         out
     }

@@ -9,8 +9,8 @@ use super::motion::{SHORT, extent};
 use super::orders;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
-    Variable, warmth,
+    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NamedForms, NumberSpec, Place, Polar, Summary, Survey,
+    Term, Variable, names, warmth,
 };
 use super::{frames, interactions};
 use crate::robot::RobotModel;
@@ -42,6 +42,8 @@ const WOBBLE: f64 = 12.0;
 /// Of an arm of unknown masses a joint that follows its own angle and its neighbour's is nearly always one that its links weigh upon: -2 ln
 /// of the odds that a hose pulls.
 const WEIGHT: f64 = 12.0;
+/// Orders that a smooth function of an angle may have, too.
+const SLOW: u32 = 2;
 /// -2 ln of the odds of things outside the library.
 const OPEN: f64 = 8.0;
 /// The same beyond that of products: they are many.
@@ -51,9 +53,6 @@ const WIDE: f64 = 0.01;
 const PER_LOAD: f64 = 1e-4;
 
 impl Unknown {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "unknown";
-
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         let unweighed = is_unweighed(survey.robot);
@@ -115,7 +114,7 @@ impl Unknown {
 impl Cause for Unknown {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::UNKNOWN,
             place: "joint, link, base, tool or tracker",
             formula: "a form-free function of joints, time, payload or sight",
             size: "any",
@@ -300,7 +299,7 @@ impl Cause for Unknown {
 
     /// A joint that follows a function of its own angle and a neighbour's: a hose runs along both and pulls.
     fn called(&self, term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
-        if is_hose(term) { "cable_drag" } else { Self::NAME }
+        if is_hose(term) { names::CABLE_DRAG } else { names::UNKNOWN }
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -312,8 +311,22 @@ impl Cause for Unknown {
         true
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "joint_table"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::GEAR_CYCLIC, names::JOINT_TABLE]
+    }
+
+    /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        let angles = own.forms.iter().find_map(|form| form.term()?.two_angles());
+        let (Some(angles), Place::Joint(joint)) = (angles, own.place) else { return false };
+        let is_part = |form: &&Form| match (form.place(), form.term().map(Term::basis)) {
+            (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
+            (at, Some(Basis::Wave { order, .. })) if form.name() == names::GEAR_CYCLIC => {
+                at == Place::Joint(joint) && angles.contains(&joint) && order <= SLOW
+            }
+            _ => false,
+        };
+        part.forms.iter().all(is_part)
     }
 
     fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
@@ -321,11 +334,11 @@ impl Cause for Unknown {
         let joint = matches!(form.place(), Place::Joint(_));
         match (term.basis(), term.law().first.of) {
             (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
-                vec![("axis_wobble", Place::Joint(by))]
+                vec![(names::AXIS_WOBBLE, Place::Joint(by))]
             }
             // No motor current tells of a pull.
-            _ if called == "cable_drag" => vec![(Self::NAME, form.place())],
-            _ if joint && term.two_angles().is_some() => vec![("cable_drag", form.place())],
+            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, form.place())],
+            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, form.place())],
             _ => Vec::new(),
         }
     }
@@ -349,7 +362,7 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
 
 /// What a finding's law without a name is a function of and how, in words; none where it has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
-    let (term, numbers) = summary.estimates(Unknown::NAME).next()?;
+    let (term, numbers) = summary.estimates(names::UNKNOWN).next()?;
     // A joint that slides errs by a length.
     let slides = matches!(term.motion(), Motion::Joint { .. }) && numbers.first().is_some_and(|number| number.unit == "mm");
     Some(in_words(term, slides, summary.clock))

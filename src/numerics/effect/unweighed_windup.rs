@@ -3,11 +3,10 @@
 //!
 //! Bodies are those from the joint outwards, their moments base parameters: two a joint that turns. Bodies that slide are left out.
 
-use super::counterbalance::Counterbalance;
 use super::form::parameters;
 use super::skeleton::moments;
 use super::{
-    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::robot::{Measurements, Posture, RobotModel};
 use crate::units::Unit;
@@ -143,7 +142,7 @@ impl UnweighedWindup {
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
     pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
         let alone = form.as_a::<Self>().is_some_and(|windup| windup.shape.own_angle);
-        if alone { vec![("gear_cyclic", form.place()), (Counterbalance::NAME, form.place())] } else { Vec::new() }
+        if alone { vec![(names::GEAR_CYCLIC, form.place()), (names::COUNTERBALANCE, form.place())] } else { Vec::new() }
     }
 }
 
@@ -246,8 +245,8 @@ impl Placed for UnweighedWindup {
         let (outwards, across) = (sum(true), sum(false));
         let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
         match self.shape.own_angle {
-            true if has(false) && across > PHASE * outwards => "gear_cyclic",
-            _ if has(true) && outwards < 0.0 => "cable_drag",
+            true if has(false) && across > PHASE * outwards => names::GEAR_CYCLIC,
+            _ if has(true) && outwards < 0.0 => names::CABLE_DRAG,
             _ => self.name(),
         }
     }

@@ -1,13 +1,13 @@
 //! `outlier` and `mislabelled_point`: single wrong points, and points under each other's name; the screening of the fit finds them.
 
-use super::{Cause, CauseDescription};
+use super::{Cause, CauseDescription, names};
 
 pub struct Outlier;
 
 impl Cause for Outlier {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "outlier",
+            name: names::OUTLIER,
             place: "recording",
             formula: "single wrong points",
             size: "any",
@@ -30,7 +30,7 @@ pub struct MislabelledPoint;
 impl Cause for MislabelledPoint {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "mislabelled_point",
+            name: names::MISLABELLED_POINT,
             place: "recording",
             formula: "points that carry each other's name",
             size: "any",

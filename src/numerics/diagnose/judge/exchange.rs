@@ -5,7 +5,7 @@ use super::comparison::{ModelComparison, others};
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Effect, Place, Unknown, follows};
+use crate::effect::{Effect, Place, follows, names};
 
 /// Rivals that are tried in place of a cause.
 pub(crate) const RIVALS: usize = 4;
@@ -160,7 +160,7 @@ impl Contested {
         let Some(bare) = look(None) else { return Outcome::Unknown };
         // What has no name must prove itself: it has no physics to carry it to other points.
         let harmful = |bare: &FoldErrors| bare.is_better_than(seen);
-        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == Unknown::NAME && seen.gain_over(bare) < 0.0;
+        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == names::UNKNOWN && seen.gain_over(bare) < 0.0;
         // Folds must outweigh what was believed before them; what does harm has lost that right.
         let convinces = |rival: &RivalOf, errors: &FoldErrors| {
             let prejudice = if harmful(&bare) { 0.0 } else { rival.prior_penalty - self.prior_penalty };
