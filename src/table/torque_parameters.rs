@@ -103,7 +103,18 @@ impl TorqueParameters {
                 rows.push(TorqueParameterRow { name, effect, place, quantity, value: *value, unit, sigma, rms_nm, form });
             }
         }
+        for term in &model.terms {
+            for (value, (name, unit, sigma)) in term.shape_numbers()?.into_iter().zip(numbers.by_ref()) {
+                let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
+                let (effect, place) = (term.effect.clone(), term.place.to_string());
+                rows.push(TorqueParameterRow { name, effect, place, quantity, value, unit, sigma, rms_nm: None, form: None });
+            }
+        }
         rows.extend(seen(model));
+        // The last number of the covariance is the width of a sign.
+        if let Some((name, _, sigma)) = numbers.next() {
+            rows.iter_mut().filter(|row| row.name == name).for_each(|row| row.sigma = sigma);
+        }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(rows))
     }
@@ -136,7 +147,8 @@ impl TorqueParameters {
             model.identified[INERTIAL_NUMBERS * link + number] = true;
         }
         let mut terms: BTreeMap<&str, Vec<&TorqueParameterRow>> = BTreeMap::new();
-        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN) {
+        // Shape numbers are in the form of each coefficient.
+        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN && row.form.is_some()) {
             let prefix = row.name.strip_suffix(row.quantity.as_str()).unwrap_or(&row.name);
             terms.entry(prefix).or_default().push(row);
         }

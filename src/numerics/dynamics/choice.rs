@@ -8,7 +8,7 @@ use super::weighted::WeightedColumns;
 /// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
 const NEARLY_ZERO: f64 = 0.2;
 /// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 50 to 1.
-const CLEAR: f64 = 8.0;
+pub(super) const CLEAR: f64 = 8.0;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
@@ -120,10 +120,9 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
     remove_below(choice, set, &|_| 0.0);
 }
 
-/// Removes what is hardly worth its penalty: what may as well be nothing is not named. Viscous and Coulomb friction hardly an arm is without.
+/// Removes what is hardly worth its penalty: what may as well be nothing is not named.
 pub(super) fn clear(choice: &CauseChoice, set: &mut Vec<usize>) {
-    let is_common = |number: usize| [VISCOUS, COULOMB].contains(&choice.form(number).cause.name());
-    remove_below(choice, set, &|number| if is_common(number) { 0.0 } else { CLEAR });
+    remove_below(choice, set, &|_| CLEAR);
 }
 
 /// Removes the least worthy until each is worth what is asked of it.

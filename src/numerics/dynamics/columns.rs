@@ -81,6 +81,12 @@ impl TorqueColumns {
         }
     }
 
+    /// Takes a column of no form; its number.
+    pub fn push_bare(&mut self, column: TorqueColumn) -> usize {
+        self.columns.push(column);
+        self.columns.len() - 1
+    }
+
     /// Columns of a form.
     pub fn of(&self, form: usize) -> std::ops::Range<usize> {
         self.first[form]..self.first[form] + self.forms[form].width
@@ -88,7 +94,7 @@ impl TorqueColumns {
 }
 
 /// A form's columns.
-fn columns_of(form: &TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> Vec<TorqueColumn> {
+pub(super) fn columns_of(form: &TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> Vec<TorqueColumn> {
     if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
         return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
     }

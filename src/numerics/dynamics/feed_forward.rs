@@ -89,7 +89,7 @@ impl TorqueModel {
         let correction: Vec<Vec<f64>> = differences.collect();
         let by_row = |courses: &[Vec<f64>]| (0..rows).flat_map(|row| courses.iter().map(move |course| course[row])).collect();
         Ok(NeededTorques {
-            u95: self.uncertainty(&forms, &scene, &courses),
+            u95: self.uncertainty(&forms, &mut scene, &courses),
             torque: by_row(&torque),
             load: by_row(&scene.rigid),
             correction: by_row(&correction),

@@ -46,7 +46,8 @@ pub struct TorqueModel {
     pub identified: Vec<bool>,
     /// All findings that add torque at joints.
     pub terms: Vec<TorqueTerm>,
-    /// Of identified inertials, then of all coefficients, row-major; with the noise's autocorrelation. Empty where it is not known.
+    /// Of identified inertials, of all coefficients, of the numbers of shapes that were found, term after term, and of the width of a
+    /// sign, row-major; with the noise's autocorrelation. Empty where it is not known.
     pub covariance: Vec<f64>,
     /// rad/s over which the sign of a velocity turns.
     pub sign_width: f64,

@@ -3,12 +3,12 @@
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
 use super::clock::RecordingClock;
-use super::columns::TorqueColumns;
+use super::columns::{TorqueColumns, columns_of};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::recording::TorqueRecording;
 use super::reduce::Reduction;
-use super::regressor::ReducedRegressor;
+use super::regressor::{ReducedRegressor, TorqueColumn};
 use super::scene::{DynamicScene, column};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
@@ -88,6 +88,11 @@ impl<'a> TorqueProblem<'a> {
     /// Takes a trial form; its number.
     pub fn push(&mut self, form: TorqueForm) -> usize {
         self.all.push(form, &self.scene, &self.reduction, &self.regressor)
+    }
+
+    /// Columns of a form that is not taken.
+    pub fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
+        columns_of(form, &self.scene, &self.reduction, &self.regressor)
     }
 
     /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.

@@ -10,8 +10,10 @@ use super::leftover::lasting_form;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
+use super::rejudge::rejudge;
 use super::rich::{noise_beside, rich_forms};
 use super::search::{search, settle};
+use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
@@ -27,6 +29,8 @@ pub(super) struct SolvedTorques<'a> {
     pub problem: TorqueProblem<'a>,
     pub weighted: WeightedColumns,
     pub judged: JudgedSet,
+    /// Of the judged set.
+    pub slopes: ShapeSlopes,
     pub latency: Option<Latency>,
 }
 
@@ -79,6 +83,10 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &set);
     weighted = problem.weighted();
+    if rejudge(&mut problem, &mut weighted, &mut set, question.seed) {
+        learn(&mut problem, &set);
+        weighted = problem.weighted();
+    }
     let judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
         settle(&choice, &mut set);
@@ -88,7 +96,8 @@ pub(super) fn solve<'a>(
         clear(&choice, &mut judged.set);
         judged
     };
-    SolvedTorques { problem, weighted, judged, latency: found }
+    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
+    SolvedTorques { problem, weighted, judged, slopes, latency: found }
 }
 
 /// Searches from what hardly an arm is without.

@@ -47,8 +47,8 @@ impl TorqueCause for Elasticity {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        let hertz = ShapeSpan { index: 0, least: 2.0, most: 20.0, by_ratio: true };
-        vec![hertz, ShapeSpan { index: 1, least: 0.005, most: 0.6, by_ratio: true }, hertz]
+        let hertz = ShapeSpan { name: "resonance", unit: "Hz", index: 0, least: 2.0, most: 20.0, by_ratio: true };
+        vec![hertz, ShapeSpan { name: "damping", unit: "1", index: 1, least: 0.005, most: 0.6, by_ratio: true }, hertz]
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {

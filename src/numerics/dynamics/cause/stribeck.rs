@@ -40,7 +40,7 @@ impl TorqueCause for Stribeck {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 0.02, most: 0.5, by_ratio: true }]
+        vec![ShapeSpan { name: "speed", unit: "rad/s", index: 0, least: 0.02, most: 0.5, by_ratio: true }]
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
