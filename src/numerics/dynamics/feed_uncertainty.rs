@@ -12,12 +12,7 @@ impl TorqueModel {
     /// Nm, 95 %, row-major (rows x n); `None` where the model carries no covariance. The variance of a torque is that of its numbers, each
     /// by what it adds (of a shape number to first order), what held-out rows left besides, and the square of what each law adds times how far beyond its range it is used, as a
     /// share of that range.
-    pub(super) fn uncertainty(
-        &self,
-        forms: &[TorqueForm],
-        scene: &mut DynamicScene,
-        courses: &[TermCourse],
-    ) -> Option<Vec<f64>> {
+    pub(super) fn uncertainty(&self, forms: &[TorqueForm], scene: &mut DynamicScene, courses: &[TermCourse]) -> Option<Vec<f64>> {
         let known = self.identified.iter().filter(|known| **known).count();
         let coefficients: Vec<&[f64]> = self.terms.iter().map(|term| term.coefficients.as_slice()).collect();
         let linear = known + coefficients.iter().map(|own| own.len()).sum::<usize>();

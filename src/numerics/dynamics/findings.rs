@@ -17,17 +17,18 @@ const TEMPERATURE: f64 = 2.0;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
-/// Findings of a judged set, strongest first.
+/// Findings of a judged set but for what is silent, strongest first.
 pub(super) fn findings(
     choice: &CauseChoice,
-    set: &[usize],
+    (set, silent): (&[usize], &[usize]),
     held_out: &[usize],
     uncertain: (&SweptColumns, &ShapeSlopes),
 ) -> Vec<TorqueFinding> {
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
+    let named = set.iter().filter(|number| silent.iter().all(|one| !choice.form(*one).is_called_as(choice.form(**number))));
     let mut found: Vec<TorqueFinding> =
-        set.iter().map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain)).collect();
+        named.map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain)).collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     found
 }

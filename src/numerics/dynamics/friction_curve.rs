@@ -49,9 +49,7 @@ fn curve(
         let laws: Vec<f64> = of(scene.sign_width).collect();
         let torque = |laws: &mut dyn Iterator<Item = f64>| laws.zip(&values).map(|(law, value)| law * value).sum::<f64>();
         let by_shape = |(number, _): &(ShapeNumber, usize)| match number {
-            ShapeNumber::SignWidth => {
-                slope(scene.sign_width, |width| torque(&mut of(width)))
-            }
+            ShapeNumber::SignWidth => slope(scene.sign_width, |width| torque(&mut of(width))),
             ShapeNumber::Of(form, index) => {
                 let Some(place) = own.iter().position(|(number, _)| number == form) else { return 0.0 };
                 let form = own[place].1;
@@ -61,8 +59,7 @@ fn curve(
         };
         let along: Vec<f64> = laws.iter().copied().chain(slopes.0.iter().map(by_shape)).collect();
         let count = along.len();
-        let variance: f64 =
-            (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
+        let variance: f64 = (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
         curve.torque.push(torque(&mut laws.iter().copied()));
         curve.sigma.push(variance.max(0.0).sqrt());
     }

@@ -4,6 +4,7 @@ use super::cause::{COULOMB, TORQUE_CAUSES, UNKNOWN, VISCOUS};
 use super::choice::CauseChoice;
 use super::findings::plain_finding;
 use super::noise::JointNoise;
+use super::sweep::SweptColumns;
 use super::types::{TorqueFinding, TorqueRival};
 use crate::effect::Place;
 use crate::statistics::nearest;
@@ -15,6 +16,8 @@ const DEVIATIONS: f64 = 3.0;
 const LEFT: f64 = 1.2;
 /// Of two torques: both together are less than this share of either.
 const CANCELLED: f64 = 0.5;
+/// Standard deviations from which on something is shown.
+const SHOWN: f64 = 2.0;
 /// Times what is left that a name must explain: less than two thirds of what stands at a joint is no explanation.
 const EXPLAINED: f64 = 2.0;
 
@@ -94,6 +97,33 @@ pub(super) fn absorb(choice: &CauseChoice, set: &[usize], solution: &[(usize, f6
                 continue;
             }
             found.retain(|finding| finding.effect != form.cause.name() || finding.place != place);
+        }
+    }
+}
+
+/// Coulomb friction that is left nowhere once a nameless drag that changes with the joint's angle is least is a part of it.
+pub(super) fn absorb_drag(choice: &CauseChoice, set: &[usize], uncertain: &SweptColumns, found: &mut Vec<TorqueFinding>) {
+    let solution = uncertain.solution();
+    let all = &choice.problem.all;
+    let column_of = |number: usize| all.of(number).start;
+    let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
+    let is_drag = |number: &&usize| {
+        let cause = choice.form(**number).cause;
+        cause.name() == UNKNOWN && cause.modifies() == [COULOMB]
+    };
+    for drag in set.iter().filter(is_drag) {
+        let place = choice.form(*drag).place;
+        let is_coulomb = |number: &&usize| choice.form(**number).cause.name() == COULOMB && choice.form(**number).place == place;
+        let Some(coulomb) = set.iter().find(is_coulomb) else { continue };
+        let columns = [column_of(*coulomb), column_of(*drag), column_of(*drag) + 1];
+        let [whole, cosine, sine] = columns.map(value);
+        let amplitude = cosine.hypot(sine).max(f64::MIN_POSITIVE);
+        // What is least of friction over a turn, with its variance.
+        let slope = [1.0, -cosine / amplitude, -sine / amplitude];
+        let covariance = uncertain.covariance(&columns);
+        let variance: f64 = (0..9).map(|entry| slope[entry / 3] * slope[entry % 3] * covariance[entry]).sum();
+        if whole - amplitude < SHOWN * variance.max(0.0).sqrt() {
+            found.retain(|finding| finding.effect != COULOMB || finding.place != place);
         }
     }
 }

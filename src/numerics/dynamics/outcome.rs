@@ -8,7 +8,7 @@ use super::findings::{contact, findings, plain_finding};
 use super::friction_curve::friction_curves;
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
-use super::nameless::{absorb, unconfirmed, unname};
+use super::nameless::{absorb, absorb_drag, unconfirmed, unname};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -48,8 +48,9 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     if let Some(enforced) = &enforced {
         remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
     }
-    let mut found = findings(&choice, set, &held, (&uncertain, &solved.slopes));
+    let mut found = findings(&choice, (set, &solved.judged.silent), &held, (&uncertain, &solved.slopes));
     absorb(&choice, set, &free, &mut found);
+    absorb_drag(&choice, set, &uncertain, &mut found);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
     unname(&choice, &last, &mut found);

@@ -90,6 +90,11 @@ impl<'a> TorqueProblem<'a> {
         self.all.push(form, &self.scene, &self.reduction, &self.regressor)
     }
 
+    /// Makes columns of the sign of a velocity anew, after its width has changed.
+    pub fn renew_signs(&mut self, set: &[usize]) {
+        self.all.renew_signs(set, &self.scene, &self.reduction, &self.regressor);
+    }
+
     /// Columns of a form that is not taken.
     pub fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
         columns_of(form, &self.scene, &self.reduction, &self.regressor)

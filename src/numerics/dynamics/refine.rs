@@ -60,7 +60,8 @@ fn try_grid(
     let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
     let gain = |number: usize| sweep.gain(number).square;
     let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
-    if gain(best) > gain(set[place]) + BETTER {
+    let asked = if span.usual == Some(now) { BETTER + (weighted.rows as f64).ln() } else { BETTER };
+    if gain(best) > gain(set[place]) + asked {
         set[place] = best;
     }
 }

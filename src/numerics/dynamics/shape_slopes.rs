@@ -136,7 +136,8 @@ pub(super) fn planned_slopes(
     }
     let width = scene.sign_width;
     for joint in 0..scene.joints() {
-        let acting = || forms.iter().zip(coefficients).filter(|(form, _)| form.cause.acts_on(form, scene.joints()).contains(&joint));
+        let acting =
+            || forms.iter().zip(coefficients).filter(|(form, _)| form.cause.acts_on(form, scene.joints()).contains(&joint));
         let own: Vec<_> = acting().collect();
         let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|share| {
             scene.sign_width = share * width;

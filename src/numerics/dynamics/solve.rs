@@ -1,12 +1,13 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::choice::{CauseChoice, backward, clear};
+use super::choice::{CauseChoice, backward, clear, other_friction};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
+use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
@@ -83,19 +84,23 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &set);
     weighted = problem.weighted();
+    polish(&mut problem, &mut weighted, &mut set);
     if rejudge(&mut problem, &mut weighted, &mut set, question.seed) {
         learn(&mut problem, &set);
         weighted = problem.weighted();
     }
-    let judged = {
+    let mut judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
         settle(&choice, &mut set);
         let mut judged = judge(&choice, set);
         // What only stood for something that was withdrawn.
         backward(&choice, &mut judged.set);
         clear(&choice, &mut judged.set);
+        judged.silent = other_friction(&choice, &judged.set);
+        judged.set.extend(&judged.silent);
         judged
     };
+    polish(&mut problem, &mut weighted, &mut judged.set);
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques { problem, weighted, judged, slopes, latency: found }
 }

@@ -81,6 +81,8 @@ pub(super) struct ShapeSpan {
     pub most: f64,
     /// Refined by ratios instead of differences.
     pub by_ratio: bool,
+    /// What it is unless the data are worth another number.
+    pub usual: Option<f64>,
 }
 
 /// A physical reason why measured torques differ from those of the rigid arm.
@@ -143,6 +145,10 @@ pub(super) trait TorqueCause: Sync {
     }
     /// Whether its columns are made of the rigid torque.
     fn is_of_rigid(&self) -> bool {
+        false
+    }
+    /// Whether its columns are made of the smoothed sign of a velocity.
+    fn is_of_sign(&self) -> bool {
         false
     }
     /// Whether several forms of it may stand at a place.
@@ -228,7 +234,8 @@ impl TorqueForm {
     pub fn shape_numbers(&self) -> Vec<ShapeSpan> {
         let mut numbers: Vec<ShapeSpan> = Vec::new();
         for span in self.cause.spans(self) {
-            if !numbers.iter().any(|known| known.index == span.index) {
+            let is_found = span.usual != Some(self.shape[span.index]);
+            if is_found && !numbers.iter().any(|known| known.index == span.index) {
                 numbers.push(span);
             }
         }

@@ -1,6 +1,8 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_each_joint_with, fill, plain, shape};
+use super::{
+    CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_each_joint_with, fill, plain, shape,
+};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -40,7 +42,8 @@ impl TorqueCause for Offset {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        let span = |most: &f64| ShapeSpan { name: "time", unit: "s", index: 0, least: 2.0, most: *most, by_ratio: true };
+        let span =
+            |most: &f64| ShapeSpan { name: "time", unit: "s", index: 0, least: 2.0, most: *most, by_ratio: true, usual: None };
         form.shape.get(1).map(span).into_iter().collect()
     }
 
@@ -71,7 +74,9 @@ impl TorqueCause for Offset {
         let constant = format!("the torque of {} reads {:.3} Nm too much, whatever it does", form.place, fitted[0].value);
         match fitted.get(1) {
             None => constant,
-            Some(cold) => format!("{constant}; it begins {:.3} Nm from that and comes there over {:.1} s", cold.value, form.shape[0]),
+            Some(cold) => {
+                format!("{constant}; it begins {:.3} Nm from that and comes there over {:.1} s", cold.value, form.shape[0])
+            }
         }
     }
 }

@@ -41,7 +41,7 @@ impl TorqueCause for TorqueConstant {
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
         let span = |largest: &f64| {
             let [least, most] = HALF_SPAN.map(|share| share * largest);
-            ShapeSpan { name: "half_at", unit: "Nm", index: 0, least, most, by_ratio: true }
+            ShapeSpan { name: "half_at", unit: "Nm", index: 0, least, most, by_ratio: true, usual: None }
         };
         form.shape.get(1).map(span).into_iter().collect()
     }

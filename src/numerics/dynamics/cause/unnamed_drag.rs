@@ -37,6 +37,10 @@ impl TorqueCause for UnnamedDrag {
         true
     }
 
+    fn is_of_sign(&self) -> bool {
+        true
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let (angle, velocity) = (&scene.position[form.joint()], &scene.velocity[form.joint()]);
         let turn = |row: usize| form.with[0] as f64 * angle[row];

@@ -34,6 +34,10 @@ impl TorqueCause for UnnamedFriction {
         true
     }
 
+    fn is_of_sign(&self) -> bool {
+        true
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
         let waves = [1.0, 2.0][column / 2];

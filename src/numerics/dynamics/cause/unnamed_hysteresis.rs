@@ -35,7 +35,15 @@ impl TorqueCause for UnnamedHysteresis {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { name: "travel", unit: "rad", index: 0, least: form.shape[1], most: form.shape[2], by_ratio: true }]
+        vec![ShapeSpan {
+            name: "travel",
+            unit: "rad",
+            index: 0,
+            least: form.shape[1],
+            most: form.shape[2],
+            by_ratio: true,
+            usual: None,
+        }]
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {

@@ -42,7 +42,11 @@ impl TorqueCause for Warmup {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 1.0, most: form.shape[1], by_ratio: true }]
+        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 1.0, most: form.shape[1], by_ratio: true, usual: None }]
+    }
+
+    fn is_of_sign(&self) -> bool {
+        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
