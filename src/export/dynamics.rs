@@ -76,6 +76,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
             INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
         ),
         "sign_width_rad_s": model.sign_width,
+        "friction_lead_s": model.friction_lead,
         "joints": joints.collect::<Vec<_>>(),
         "links": links.collect::<Vec<_>>(),
         "causes": causes(torques),

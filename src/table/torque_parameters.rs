@@ -54,8 +54,8 @@ const RANGE: [(&str, &str); 7] = [
     ("misfit", "Nm"),
     ("u95_usual", "Nm"),
 ];
-/// Of the recording as a whole: width of a sign, latency, cut-off.
-const WHOLE: [(&str, &str); 3] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz")];
+/// Of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
+const WHOLE: [(&str, &str); 4] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz"), ("friction_lead", "s")];
 
 /// Where it was recorded, C.
 const TEMPERATURE: [&str; 2] = ["temperature_least", "temperature_greatest"];
@@ -122,6 +122,8 @@ impl TorqueParameters {
             sign_width: self.value(&format!("{SEEN}.{}", WHOLE[0].0))?,
             latency: self.value(&format!("{SEEN}.{}", WHOLE[1].0))?,
             cutoff: self.value(&format!("{SEEN}.{}", WHOLE[2].0))?,
+            // Tables of before it was written say nothing of it.
+            friction_lead: self.value(&format!("{SEEN}.{}", WHOLE[3].0)).unwrap_or(0.0),
             range: (1..=joints).map(|joint| self.range(joint)).collect::<Result<_>>()?,
             temperature: self.temperature(),
         };
@@ -178,7 +180,7 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         rms_nm: None,
         form: None,
     };
-    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff]);
+    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff, model.friction_lead]);
     let whole = whole.map(|(named, value)| row(format!("{SEEN}.{}", named.0), Place::Recording, *named, value));
     let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
         let of = move |(named, value): (&(&'static str, &'static str), f64)| {

@@ -128,6 +128,7 @@ impl TorqueModel {
         let clock = RecordingClock::even(&motion.time);
         let mut scene = DynamicScene::new(arm, &recording, &clock, self.cutoff, false);
         scene.sign_width = self.sign_width;
+        scene.friction_lead = self.friction_lead;
         let begun = motion.since_start.unwrap_or(LONG_AGO);
         scene.time.iter_mut().for_each(|time| *time += begun);
         let columns = |all: &Vec<f64>| (0..n).map(|joint| column(all, n, joint)).collect::<Vec<Vec<f64>>>();

@@ -73,6 +73,7 @@ mod tests {
             terms: Vec::new(),
             covariance: Vec::new(),
             sign_width: 0.01,
+            friction_lead: 0.0,
             latency: 0.0,
             cutoff: 10.0,
             temperature: None,

@@ -50,6 +50,8 @@ pub struct TorqueModel {
     pub covariance: Vec<f64>,
     /// rad/s over which the sign of a velocity turns.
     pub sign_width: f64,
+    /// s by which friction turns before the velocity does.
+    pub friction_lead: f64,
     /// s by which the recording's torques came late; they do not when they are commanded.
     pub latency: f64,
     /// Hz, of the low-pass of the recording.

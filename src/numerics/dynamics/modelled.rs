@@ -43,6 +43,7 @@ impl TorqueModel {
             terms: adding.iter().map(term).collect(),
             covariance,
             sign_width: problem.scene.sign_width,
+            friction_lead: problem.scene.friction_lead,
             latency: problem.latency,
             cutoff: problem.reduction.cutoff,
             range: certainty

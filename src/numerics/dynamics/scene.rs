@@ -35,6 +35,8 @@ pub(super) struct DynamicScene<'a> {
     pub sideways: [Vec<Vec<f64>>; 2],
     /// rad/s over which the sign of a velocity turns.
     pub sign_width: f64,
+    /// s by which friction turns before the velocity does.
+    pub friction_lead: f64,
     /// Declared inertials; `None` where none are declared.
     pub declared: Option<DeclaredInertials>,
 }
@@ -57,6 +59,7 @@ impl<'a> DynamicScene<'a> {
             rigid: vec![vec![0.0; rows]; n],
             sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
             sign_width: SIGN_WIDTHS[1],
+            friction_lead: 0.0,
             declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
         };
         for joint in 0..n {
@@ -88,6 +91,11 @@ impl<'a> DynamicScene<'a> {
     /// Smoothed sign of a velocity.
     pub fn sign(&self, velocity: f64) -> f64 {
         (velocity / self.sign_width).tanh()
+    }
+
+    /// Smoothed sign of a joint's velocity in a row, as friction has it.
+    pub fn direction(&self, joint: usize, row: usize) -> f64 {
+        self.sign(self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row])
     }
 
     /// s from first to last row.

@@ -13,24 +13,10 @@ const RIDGE: f64 = 1e-6;
 
 /// The best near one of [`SIGN_WIDTHS`], rad/s.
 pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
-    let runs = problem.runs(false);
-    let rows: Vec<usize> = runs.iter().flat_map(Clone::clone).collect();
-    let base = problem.base_courses(&rows);
-    let mut room = Vec::new();
+    let fit = FrictionFit::new(problem);
     let mut left_by = |width: f64| {
         problem.scene.sign_width = width;
-        let mut left = 0.0;
-        for (joint, inertial) in base.iter().enumerate() {
-            let scene = &problem.scene;
-            let signs = scene.velocity[joint].iter().map(|velocity| scene.sign(*velocity)).collect::<Vec<f64>>();
-            let courses = [scene.velocity[joint].clone(), signs, vec![1.0; scene.rows()]];
-            let reduced = courses.map(|mut course| problem.reduction.reduce(&mut course, &mut room));
-            let friction = reduced.iter().map(|course| rows.iter().map(|row| course[*row]).collect::<Vec<f64>>());
-            let columns: Vec<Vec<f64>> = inertial.iter().cloned().chain(friction).collect();
-            let measured: Vec<f64> = rows.iter().map(|row| problem.measured[joint][*row]).collect();
-            left += mean_square_left(&columns, &measured).ln();
-        }
-        left
+        fit.left(problem).iter().sum::<f64>()
     };
     let mut best = (f64::INFINITY, SIGN_WIDTHS[0]);
     let mut try_width = |width: f64, best: &mut (f64, f64)| {
@@ -45,6 +31,41 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
         [about * (-step).exp(), about * step.exp()].iter().for_each(|width| try_width(*width, &mut best));
     }
     best.1
+}
+
+/// Base, viscous and Coulomb friction and offset, each joint by itself, on the fitted rows.
+pub(super) struct FrictionFit {
+    rows: Vec<usize>,
+    /// `[joint][column][fitted row]`.
+    base: Vec<Vec<Vec<f64>>>,
+}
+
+impl FrictionFit {
+    /// Of the rows that count at present.
+    pub fn new(problem: &TorqueProblem) -> Self {
+        let rows: Vec<usize> = problem.runs(false).iter().flat_map(Clone::clone).collect();
+        Self { base: problem.base_courses(&rows), rows }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Logarithm of the mean square that is left at each joint as friction turns at present.
+    pub fn left(&self, problem: &TorqueProblem) -> Vec<f64> {
+        let (scene, mut room) = (&problem.scene, Vec::new());
+        let mut of = |(joint, inertial): (usize, &Vec<Vec<f64>>)| {
+            let signs = (0..scene.rows()).map(|row| scene.direction(joint, row)).collect::<Vec<f64>>();
+            let courses = [scene.velocity[joint].clone(), signs, vec![1.0; scene.rows()]];
+            let reduced = courses.map(|mut course| problem.reduction.reduce(&mut course, &mut room));
+            let friction = reduced.iter().map(|course| self.rows.iter().map(|row| course[*row]).collect::<Vec<f64>>());
+            let columns: Vec<Vec<f64>> = inertial.iter().cloned().chain(friction).collect();
+            let measured: Vec<f64> = self.rows.iter().map(|row| problem.measured[joint][*row]).collect();
+            mean_square_left(&columns, &measured).ln()
+        };
+        self.base.iter().enumerate().map(|one| of(one)).collect()
+    }
 }
 
 /// Of a fit of scaled columns.

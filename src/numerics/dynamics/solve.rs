@@ -5,6 +5,7 @@ use super::choice::{CauseChoice, backward, clear};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::judge::{JudgedSet, judge};
+use super::friction_lead::take_friction_lead;
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
 use super::problem::TorqueProblem;
@@ -21,6 +22,8 @@ use super::weighted::WeightedColumns;
 const NAMELESS: usize = 4;
 /// s.
 const SAME_TIME: f64 = 0.1;
+/// Rounds in which a latency and the lead of friction find each other, at most.
+const CLOCK_ROUNDS: usize = 3;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {
@@ -43,11 +46,10 @@ pub(super) fn solve<'a>(
     problem.scene.sign_width = sign_width(&mut problem);
     problem.form(&question.without);
     let asked = |name: &str| question.without.iter().all(|without| without != name);
-    let found = latency(&problem).filter(|_| asked(super::LATENCY));
     let touched = asked(super::CONTACT);
+    let found = clocked(&mut problem, question, asked(super::LATENCY));
     if let Some(latency) = &found {
         tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
-        problem.shift(latency.seconds);
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
@@ -89,6 +91,20 @@ pub(super) fn solve<'a>(
         judged
     };
     SolvedTorques { problem, weighted, judged, latency: found }
+}
+
+/// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
+fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: bool) -> Option<Latency> {
+    let mut found = None;
+    for _ in 0..CLOCK_ROUNDS {
+        found = latency(problem).filter(|_| is_asked);
+        problem.shift(found.map_or(0.0, |latency| latency.seconds));
+        if !take_friction_lead(problem) {
+            break;
+        }
+        problem.form(&question.without);
+    }
+    found
 }
 
 /// Searches from what hardly an arm is without.

@@ -45,7 +45,7 @@ impl TorqueCause for Stribeck {
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
-        fill(out, |row| scene.sign(velocity[row]) * (-velocity[row].abs() / form.shape[0]).exp());
+        fill(out, |row| scene.direction(form.joint(), row) * (-velocity[row].abs() / form.shape[0]).exp());
     }
 
     fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {
