@@ -133,7 +133,8 @@ fn prepared<'a>(arm: &'a DynamicArm, one: &DiagnosedRecording, about: &TorqueMod
     recording.held_out.fill(false);
     let question = TorqueQuestion { free_inertials: arm.links.is_none(), ..TorqueQuestion::default() };
     let mut problem = TorqueProblem::new(arm, &recording, &question, clock, about.cutoff);
-    problem.scene.sign_width = about.sign_width;
+    problem.scene.turn_over(about.sign_width);
+    problem.scene.sign_widths = about.range.iter().map(|range| range.sign_width).collect();
     problem.scene.friction_lead = about.friction_lead;
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);

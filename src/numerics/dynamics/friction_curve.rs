@@ -31,7 +31,7 @@ fn curve(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, joint: us
     let mut curve = FrictionCurve { joint, velocity: points.collect(), torque: Vec::new(), sigma: Vec::new() };
     for velocity in &curve.velocity {
         let laws: Vec<f64> =
-            own.iter().filter_map(|(_, form)| form.cause.friction(form, *velocity, scene.sign(*velocity))).collect();
+            own.iter().filter_map(|(_, form)| form.cause.friction(form, *velocity, scene.sign_at(joint, *velocity))).collect();
         let variance: f64 = (0..laws.len())
             .flat_map(|a| (0..laws.len()).map(move |b| (a, b)))
             .map(|(a, b)| laws[a] * laws[b] * covariance[a * laws.len() + b])

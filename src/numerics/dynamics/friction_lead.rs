@@ -2,7 +2,7 @@
 //! acceleration, and velocities that a drive smooths lag behind the friction that it feels.
 
 use super::problem::TorqueProblem;
-use super::sign_width::{FrictionFit, sign_width};
+use super::sign_width::{FrictionFit, own_sign_widths, sign_width};
 
 /// s: most on either side, and the first step.
 const MOST: f64 = 0.024;
@@ -22,7 +22,7 @@ const AGREEING: f64 = 0.6;
 /// Takes the lead that most joints agree on, 0 where they do not, with the width of the sign beside it; tells whether it is another than
 /// before.
 pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
-    let (before, width) = (problem.scene.friction_lead, problem.scene.sign_width);
+    let before = problem.scene.friction_lead;
     let fit = FrictionFit::new(problem);
     let mut left_by = |lead: f64| {
         problem.scene.friction_lead = lead;
@@ -51,6 +51,13 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
     let found = if is_one { best.1 } else { 0.0 };
     let is_new = (found - before).abs() > SAME;
     problem.scene.friction_lead = if is_new { found } else { before };
-    problem.scene.sign_width = if is_new { sign_width(problem) } else { width };
+    if is_new {
+        let width = sign_width(problem);
+        problem.scene.turn_over(width);
+        if is_one {
+            // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
+            problem.scene.sign_widths = own_sign_widths(problem);
+        }
+    }
     is_new
 }

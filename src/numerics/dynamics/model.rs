@@ -35,6 +35,8 @@ pub struct JointRange {
     pub misfit: f64,
     /// Nm, 95 %: what is usual for the model's torque there, by the covariance and the misfit.
     pub usual: f64,
+    /// rad/s over which the sign of its velocity turns: the model's, but where friction leads.
+    pub sign_width: f64,
 }
 
 /// The identified model of an arm's torques.

@@ -111,6 +111,7 @@ fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> Join
         load: most(&problem.scene.rigid[joint]),
         misfit,
         usual,
+        sign_width: problem.scene.sign_widths[joint],
     }
 }
 

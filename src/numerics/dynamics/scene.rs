@@ -31,10 +31,12 @@ pub(super) struct DynamicScene<'a> {
     pub acceleration: Vec<Vec<f64>>,
     /// Nm, of the inertials as they are believed at present, payload included.
     pub rigid: Vec<Vec<f64>>,
-    /// Nm, of the declared masses under a gravity of 9.81 m/s^2 along x, then along y of the base.
+    /// Nm, under a gravity of 9.81 m/s^2 along x, then along y of the base: of the declared masses, once a tilt is known of those that are
+    /// believed.
     pub sideways: [Vec<Vec<f64>>; 2],
-    /// rad/s over which the sign of a velocity turns.
+    /// rad/s over which the sign of a velocity turns; at each joint.
     pub sign_width: f64,
+    pub sign_widths: Vec<f64>,
     /// s by which friction turns before the velocity does.
     pub friction_lead: f64,
     /// Declared inertials; `None` where none are declared.
@@ -59,6 +61,7 @@ impl<'a> DynamicScene<'a> {
             rigid: vec![vec![0.0; rows]; n],
             sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
             sign_width: SIGN_WIDTHS[1],
+            sign_widths: vec![SIGN_WIDTHS[1]; n],
             friction_lead: 0.0,
             declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
         };
@@ -93,9 +96,20 @@ impl<'a> DynamicScene<'a> {
         (velocity / self.sign_width).tanh()
     }
 
+    /// Takes one width over which the sign of a velocity turns, rad/s, for all joints.
+    pub fn turn_over(&mut self, width: f64) {
+        self.sign_width = width;
+        self.sign_widths.fill(width);
+    }
+
     /// Smoothed sign of a joint's velocity in a row, as friction has it.
     pub fn direction(&self, joint: usize, row: usize) -> f64 {
-        self.sign(self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row])
+        self.sign_at(joint, self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row])
+    }
+
+    /// Smoothed sign of a velocity of a joint.
+    pub fn sign_at(&self, joint: usize, velocity: f64) -> f64 {
+        (velocity / self.sign_widths[joint]).tanh()
     }
 
     /// s from first to last row.
@@ -113,8 +127,8 @@ impl<'a> DynamicScene<'a> {
         self.torques(theta, &self.arm.gravity, true)
     }
 
-    /// Torques of a gravity from the side.
-    fn tilt(&mut self, theta: &[f64]) {
+    /// Takes 10 n inertial numbers for the torques of a gravity from the side.
+    pub fn tilt(&mut self, theta: &[f64]) {
         self.sideways = [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
     }
 

@@ -4,8 +4,8 @@ use super::arm::DynamicArm;
 use super::choice::{CauseChoice, backward, clear};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
-use super::judge::{JudgedSet, judge};
 use super::friction_lead::take_friction_lead;
+use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
 use super::problem::TorqueProblem;
@@ -43,7 +43,8 @@ pub(super) fn solve<'a>(
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
     let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
-    problem.scene.sign_width = sign_width(&mut problem);
+    let width = sign_width(&mut problem);
+    problem.scene.turn_over(width);
     problem.form(&question.without);
     let asked = |name: &str| question.without.iter().all(|without| without != name);
     let touched = asked(super::CONTACT);
@@ -132,7 +133,7 @@ fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<u
         let sweep = CauseChoice::new(problem, weighted, seed).base.with(&set);
         problem.inertials(&set, &sweep.solution())
     };
-    problem.believe(&theta);
+    problem.believe(&theta, &set);
     learn(problem, &set);
     *weighted = problem.weighted();
     let mut set = search(&CauseChoice::new(problem, weighted, seed), set);
