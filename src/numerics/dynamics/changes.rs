@@ -133,7 +133,9 @@ fn prepared<'a>(arm: &'a DynamicArm, one: &DiagnosedRecording, about: &TorqueMod
     recording.held_out.fill(false);
     let question = TorqueQuestion { free_inertials: arm.links.is_none(), ..TorqueQuestion::default() };
     let mut problem = TorqueProblem::new(arm, &recording, &question, clock, about.cutoff);
-    problem.scene.sign_width = about.sign_width;
+    problem.scene.turn_over(about.sign_width);
+    problem.scene.turn_each_over(about.range.iter().map(|range| range.sign_width));
+    problem.scene.friction_lead = about.friction_lead;
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);
     let all: Vec<String> = TORQUE_CAUSES.iter().map(|cause| cause.name().to_string()).collect();

@@ -27,6 +27,7 @@ mod feed_uncertainty;
 mod filter;
 mod findings;
 mod friction_curve;
+mod friction_lead;
 mod inertial_names;
 mod inertials;
 mod judge;

@@ -35,6 +35,8 @@ pub struct JointRange {
     pub misfit: f64,
     /// Nm, 95 %: what is usual for the model's torque there, by the covariance and the misfit.
     pub usual: f64,
+    /// rad/s over which the sign of its velocity turns: the model's, but where friction leads.
+    pub sign_width: f64,
 }
 
 /// The identified model of an arm's torques.
@@ -51,6 +53,8 @@ pub struct TorqueModel {
     pub covariance: Vec<f64>,
     /// rad/s over which the sign of a velocity turns.
     pub sign_width: f64,
+    /// s by which friction turns before the velocity does.
+    pub friction_lead: f64,
     /// s by which the recording's torques came late; they do not when they are commanded.
     pub latency: f64,
     /// Hz, of the low-pass of the recording.

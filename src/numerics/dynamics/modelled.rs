@@ -49,6 +49,7 @@ impl TorqueModel {
             terms: adding.iter().map(term).collect(),
             covariance,
             sign_width: problem.scene.sign_width,
+            friction_lead: problem.scene.friction_lead,
             latency: problem.latency,
             cutoff: problem.reduction.cutoff,
             range: certainty
@@ -123,6 +124,7 @@ fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> Join
         load: most(&problem.scene.rigid[joint]),
         misfit,
         usual,
+        sign_width: problem.scene.width_at(joint),
     }
 }
 

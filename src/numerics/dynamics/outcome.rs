@@ -108,8 +108,14 @@ fn said_of_bodies(enforced: &EnforcedBodies, before: &TorqueErrors, after: &Torq
 
 /// How rows came about.
 fn said_of_filters(problem: &TorqueProblem) -> String {
+    let lead = 1e3 * problem.scene.friction_lead;
+    let turns = match lead {
+        0.0 => String::new(),
+        lead if lead > 0.0 => format!(", {lead:.1} ms before the velocity does"),
+        lead => format!(", {:.1} ms after the velocity does", -lead),
+    };
     format!(
-        "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s",
+        "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s{turns}",
         problem.reduction.cutoff, problem.reduction.rate, problem.scene.sign_width
     )
 }

@@ -12,6 +12,7 @@ use super::regressor::{ReducedRegressor, TorqueColumn};
 use super::scene::{DynamicScene, column};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
+use crate::effect::Place;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -127,9 +128,13 @@ impl<'a> TorqueProblem<'a> {
         theta
     }
 
-    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit.
-    pub fn believe(&mut self, theta: &[f64]) {
+    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit with a set of forms.
+    pub fn believe(&mut self, theta: &[f64], set: &[usize]) {
         self.scene.believe(theta);
+        // A tilt times what is wrong of the masses looks like offsets.
+        if set.iter().any(|number| self.all.forms[*number].place == Place::Base) {
+            self.scene.tilt(theta);
+        }
         self.all.renew(&self.scene, &self.reduction, &self.regressor);
     }
 

@@ -4,6 +4,7 @@ use super::arm::DynamicArm;
 use super::choice::{CauseChoice, backward, clear, other_friction};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
+use super::friction_lead::take_friction_lead;
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
@@ -24,6 +25,8 @@ use super::weighted::WeightedColumns;
 const NAMELESS: usize = 4;
 /// s.
 const SAME_TIME: f64 = 0.1;
+/// Rounds in which a latency and the lead of friction find each other, at most.
+const CLOCK_ROUNDS: usize = 3;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {
@@ -45,14 +48,14 @@ pub(super) fn solve<'a>(
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
     let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
-    problem.scene.sign_width = sign_width(&mut problem);
+    let width = sign_width(&mut problem);
+    problem.scene.turn_over(width);
     problem.form(&question.without);
     let asked = |name: &str| question.without.iter().all(|without| without != name);
-    let found = latency(&problem).filter(|_| asked(super::LATENCY));
     let touched = asked(super::CONTACT);
+    let found = clocked(&mut problem, question, asked(super::LATENCY));
     if let Some(latency) = &found {
         tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
-        problem.shift(latency.seconds);
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
@@ -105,6 +108,20 @@ pub(super) fn solve<'a>(
     SolvedTorques { problem, weighted, judged, slopes, latency: found }
 }
 
+/// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
+fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: bool) -> Option<Latency> {
+    let mut found = None;
+    for _ in 0..CLOCK_ROUNDS {
+        found = latency(problem).filter(|_| is_asked);
+        problem.shift(found.map_or(0.0, |latency| latency.seconds));
+        if !take_friction_lead(problem) {
+            break;
+        }
+        problem.form(&question.without);
+    }
+    found
+}
+
 /// Searches from what hardly an arm is without.
 fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -> Vec<usize> {
     let choice = CauseChoice::new(problem, weighted, seed);
@@ -130,7 +147,7 @@ fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<u
         let sweep = CauseChoice::new(problem, weighted, seed).base.with(&set);
         problem.inertials(&set, &sweep.solution())
     };
-    problem.believe(&theta);
+    problem.believe(&theta, &set);
     learn(problem, &set);
     *weighted = problem.weighted();
     let mut set = search(&CauseChoice::new(problem, weighted, seed), set);

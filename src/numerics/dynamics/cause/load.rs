@@ -42,7 +42,7 @@ impl TorqueCause for LoadFriction {
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
-        fill(out, |row| scene.sign(scene.velocity[joint][row]) * scene.rigid[joint][row].abs());
+        fill(out, |row| scene.direction(joint, row) * scene.rigid[joint][row].abs());
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {

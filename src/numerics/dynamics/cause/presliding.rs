@@ -55,7 +55,7 @@ impl TorqueCause for PreslidingFriction {
                 if moved != 0.0 {
                     kept = moved.signum() + (kept - moved.signum()) * (-moved.abs() / travel).exp();
                 }
-                out[row] = kept - scene.sign(velocity[row]);
+                out[row] = kept - scene.direction(form.joint(), row);
             }
         }
     }

@@ -54,7 +54,7 @@ impl TorqueCause for Stribeck {
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
-        fill(out, |row| scene.sign(velocity[row]) * falls(form, velocity[row]));
+        fill(out, |row| scene.direction(form.joint(), row) * falls(form, velocity[row]));
     }
 
     fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {

@@ -45,7 +45,7 @@ impl TorqueCause for UnnamedDrag {
         let (angle, velocity) = (&scene.position[form.joint()], &scene.velocity[form.joint()]);
         let turn = |row: usize| form.with[0] as f64 * angle[row];
         let wave = |row: usize| if column == 0 { turn(row).cos() } else { turn(row).sin() };
-        fill(out, |row| scene.sign(velocity[row]) * wave(row));
+        fill(out, |row| scene.direction(form.joint(), row) * wave(row));
     }
 
     fn has_shape(&self, shape: &[f64]) -> bool {

@@ -54,7 +54,7 @@ impl TorqueCause for Warmup {
         let decay = |row: usize| (-scene.time[row] / form.shape[0]).exp();
         match column {
             0 => fill(out, |row| decay(row) * velocity[row]),
-            _ => fill(out, |row| decay(row) * scene.sign(velocity[row])),
+            _ => fill(out, |row| decay(row) * scene.direction(form.joint(), row)),
         }
     }
 
