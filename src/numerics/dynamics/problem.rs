@@ -46,12 +46,12 @@ impl<'a> TorqueProblem<'a> {
     /// Of a checked recording.
     pub fn new(
         arm: &'a DynamicArm,
-        recording: &TorqueRecording,
+        recording: TorqueRecording,
         question: &TorqueQuestion,
         clock: &RecordingClock,
         cutoff: f64,
     ) -> Self {
-        let scene = DynamicScene::new(arm, recording, clock, cutoff, question.free_inertials);
+        let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
         let mut room = Vec::new();

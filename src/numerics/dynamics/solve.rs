@@ -41,7 +41,7 @@ pub(super) struct SolvedTorques<'a> {
 /// Looks for causes.
 pub(super) fn solve<'a>(
     arm: &'a DynamicArm,
-    recording: &TorqueRecording,
+    recording: TorqueRecording,
     question: &TorqueQuestion,
     clock: &RecordingClock,
     cutoff: f64,

@@ -42,7 +42,7 @@ impl TorqueCause for UnnamedDrag {
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
-        let (angle, velocity) = (&scene.position[form.joint()], &scene.velocity[form.joint()]);
+        let angle = &scene.position[form.joint()];
         let turn = |row: usize| form.with[0] as f64 * angle[row];
         let wave = |row: usize| if column == 0 { turn(row).cos() } else { turn(row).sin() };
         fill(out, |row| scene.direction(form.joint(), row) * wave(row));
