@@ -61,7 +61,8 @@ const WHOLE: [(&str, &str); 3] = [("sign_width", "rad/s"), ("latency", "s"), ("c
 const TEMPERATURE: [&str; 2] = ["temperature_least", "temperature_greatest"];
 
 fn ends(range: &JointRange) -> [f64; 7] {
-    [range.position[0], range.position[1], range.speed, range.acceleration, range.load, range.misfit, range.usual]
+    let [lowest, highest] = range.position;
+    [lowest, highest, range.speed, range.acceleration, range.load, range.misfit, range.usual]
 }
 
 fn fault(message: String) -> Error {
