@@ -39,6 +39,7 @@ mod held_locks;
 mod identify;
 mod ingest;
 mod init;
+mod kinds;
 mod layers;
 mod learn;
 mod lengths;

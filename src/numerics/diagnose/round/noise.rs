@@ -139,13 +139,12 @@ impl RepeatPairs {
         }
         let predicted = model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
-            let variance = |row: usize| Matrix3::from_diagonal(&data.sigma[row].map(|s| s * s));
+            let variance = |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
             let known =
                 if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
-            (data.position[*b] - data.position[*a] - known, variance(*a) + variance(*b), spread.points[*b] * 2.0)
+            Some((data.point(*b)? - data.point(*a)? - known, variance(*a) + variance(*b), spread.points[*b] * 2.0))
         };
-        let whole = |[a, b]: &&[usize; 2]| data.whole(*a) && data.whole(*b);
-        let mut samples: Vec<_> = self.pairs.iter().filter(whole).map(one).collect();
+        let mut samples: Vec<_> = self.pairs.iter().filter_map(one).collect();
         for [a, b] in self.pairs.iter().filter(|[a, b]| data.anchor(*a) == data.anchor(*b)) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
             let both = to.iter().filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
@@ -158,7 +157,7 @@ impl RepeatPairs {
 
 /// The rows of a pose that measured other than whole points of one target, from one anchor, where there are several.
 fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
-    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.axes(*row);
+    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.points.axes(*row);
     let same = |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
     let mut out: Vec<Vec<usize>> = Vec::new();
     for pose in poses.all() {
@@ -180,10 +179,10 @@ pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: 
     let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
     let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
-        let residual = data.position[*row] - predicted[*row];
-        (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread.points[*row])
+        let residual = data.point(*row)? - predicted[*row];
+        Some((residual * freedom, Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s)), spread.points[*row]))
     };
-    let mut samples: Vec<_> = rows.iter().filter(|row| data.whole(**row)).map(one).collect();
+    let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
     samples.extend(others.map(|left| (left.error * freedom, left.fixed, left.varying)));
     likeliest(&samples, 6.0)

@@ -27,12 +27,13 @@ pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
 }
 
 impl<'a> PointPairs<'a> {
-    /// Joints of rows, each beside the point of a row.
+    /// Joints of rows, each beside the point of a row that has a whole one.
     pub fn of(robot: &'a RobotModel, data: &Measurements, rows: impl Iterator<Item = (usize, usize)>) -> Self {
         let (mut q, mut points, mut target) = (Vec::new(), Vec::new(), Vec::new());
         for (joints, point) in rows {
+            let Some(place) = data.point(point) else { continue };
             q.extend_from_slice(data.q(joints));
-            points.push(data.position[point]);
+            points.push(place);
             target.push(robot.setup().target(data.target(point)).unwrap_or(0));
         }
         Self { robot, q, points, target, targets: robot.setup().targets.len().max(1) }

@@ -12,7 +12,7 @@ use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::observation::{MeasurementKind, SocketKind, rank};
-use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
+use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target};
 use crate::spatial::Pose;
 use faer::Mat;
 use nalgebra::Vector3;
@@ -125,8 +125,7 @@ fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
     let anchor = Some(Named::of(names.iter().map(String::as_str)));
     let readings = Readings { kind: SocketKind.about().name, sigma: vec![sigma; rows], anchor, ..Readings::default() };
     Measurements {
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(f64::INFINITY); rows],
+        points: PointReadings::none(rows),
         payload: vec![0.0; rows],
         readings: vec![readings],
         ..Measurements::default()
@@ -172,7 +171,7 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
     let mut data = Measurements { joints: site.ranges.len(), ..socketed(sockets.clone(), request.sigma) };
     data.q = found.into_iter().flat_map(|(_, q)| q).collect();
     data.payload.fill(payload);
-    data.position = sockets.iter().map(|socket| request.places[*socket]).collect();
+    data.points.position = sockets.iter().map(|socket| request.places[*socket]).collect();
     Ok((data, sockets))
 }
 

@@ -99,7 +99,7 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
     if drawn.rows() < 2 * wish.count {
         return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
     }
-    drawn.position = model.predict(&drawn);
+    drawn.points.position = model.predict(&drawn);
     let all: Vec<usize> = (0..model.stack.specs().len()).collect();
     let orders: Vec<(f64, Vec<usize>)> = match &wish.aim {
         Aim::Information => vec![(1.0, all)],
@@ -126,7 +126,7 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
         poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
     }
     let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
-    poses.position = model.predict(&poses);
+    poses.points.position = model.predict(&poses);
     let whole = whole.clone();
     let (direction, approach_seen) = visit_order::approach(&model, &whole, &poses, wish.seed);
 
@@ -210,8 +210,7 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
     Measurements {
         joints: data.joints,
         q: rows.iter().flat_map(|row| data.q(*row).iter().copied()).collect(),
-        position: rows.iter().map(|row| data.position[*row]).collect(),
-        sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
+        points: data.points.subset(rows),
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
         time: data.time.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
         temperature: data.temperature.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),

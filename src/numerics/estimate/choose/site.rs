@@ -73,7 +73,7 @@ impl Site {
         let mut out = poses.clone();
         for row in 0..poses.rows() {
             let here = poses.q(row);
-            let sigma = poses.sigma[row].x;
+            let sigma = poses.points.sigma[row].x;
             let mut offer = |q: Vec<f64>| {
                 if self.allows(robot, &q) {
                     self.push(&mut out, robot, &q, sigma);
@@ -120,8 +120,7 @@ impl Site {
         let point = robot.forward(q).translation;
         for payload in &self.payloads {
             out.q.extend_from_slice(q);
-            out.position.push(point);
-            out.sigma.push(Vector3::repeat(sigma));
+            out.points.push(point, sigma);
             out.payload.push(*payload);
         }
     }

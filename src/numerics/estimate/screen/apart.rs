@@ -54,19 +54,18 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
     if apart.iter().all(|offset| *offset == 0) {
         return;
     }
-    let whole = (0..apart.len()).filter(|row| data.whole(*row));
-    let paired = whole.filter_map(|row| Some((*other(predicted, row, apart[row])?, data.position[row])));
+    let paired = (0..apart.len()).filter_map(|row| Some((*other(predicted, row, apart[row])?, data.point(row)?)));
     let (from, to): (Vec<_>, Vec<_>) = paired.unzip();
     if from.len() < STRETCH {
         return;
     }
     let base = align_points(&from, &to);
-    let off = |row: usize, offset: i64| Some((base.point(other(predicted, row, offset)?) - data.position[row]).norm());
+    let off = |row: usize, offset: i64| Some((base.point(other(predicted, row, offset)?) - data.point(row)?).norm());
     let rows: Vec<usize> = (0..apart.len()).collect();
     let claimed: Vec<i64> = apart.to_vec();
     for run in rows.chunk_by(|a, b| claimed[*a] == claimed[*b]).filter(|run| claimed[run[0]] != 0) {
         let middle = |offset: i64| {
-            let mut all: Vec<f64> = run.iter().filter(|row| data.whole(**row)).filter_map(|row| off(*row, offset)).collect();
+            let mut all: Vec<f64> = run.iter().filter_map(|row| off(*row, offset)).collect();
             nearest(&mut all, 0.5)
         };
         let better = middle(claimed[run[0]]).zip(middle(0)).is_some_and(|(there, own)| TOGETHER * there < own);
@@ -104,9 +103,8 @@ struct AlignedStretch {
 impl AlignedStretch {
     /// With the joints `offset` rows further on; `None` where too few rows have both.
     fn fit(data: &Measurements, predicted: &[Vector3<f64>], rows: Range<usize>, offset: i64) -> Option<Self> {
-        let whole = rows.filter(|row| data.whole(*row));
         let (from, to): (Vec<_>, Vec<_>) =
-            whole.filter_map(|row| Some((*other(predicted, row, offset)?, data.position[row]))).unzip();
+            rows.filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?))).unzip();
         if 2 * from.len() < STRETCH {
             return None;
         }
@@ -120,8 +118,10 @@ impl AlignedStretch {
 
     /// Whether the measured point of a row is far nearer with the joints `offset` rows further on than with its own.
     fn nearer(&self, data: &Measurements, predicted: &[Vector3<f64>], row: usize, offset: i64) -> bool {
-        let off = |point: &Vector3<f64>| (self.motion.point(point) - data.position[row]).norm();
-        data.whole(row) && other(predicted, row, offset).is_some_and(|there| BETTER * off(there) < off(&predicted[row]))
+        data.point(row).zip(other(predicted, row, offset)).is_some_and(|(measured, there)| {
+            let off = |point: &Vector3<f64>| (self.motion.point(point) - measured).norm();
+            BETTER * off(there) < off(&predicted[row])
+        })
     }
 }
 

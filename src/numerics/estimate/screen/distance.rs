@@ -63,7 +63,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
             }
             standings.push(LeaveOneOut {
                 predicted,
-                residual: data.residual(row, &predicted),
+                residual: data.points.residual(row, &predicted),
                 sigma: noise(data, row).hypot(3f64.sqrt() * problem.excess.length) / 3f64.sqrt(),
                 distance: 0.0,
             });

@@ -52,7 +52,8 @@ pub(super) fn name(
 ) -> Vec<(usize, SuspectKind, Option<usize>)> {
     let mut kinds: BTreeMap<usize, (SuspectKind, Option<usize>)> = BTreeMap::new();
     for &row in flagged {
-        if let Some(kind) = misread(&data.position[row], &standings[row].predicted, SLIP_TOLERANCE) {
+        let misread = data.point(row).and_then(|point| misread(&point, &standings[row].predicted, SLIP_TOLERANCE));
+        if let Some(kind) = misread {
             kinds.insert(row, (kind, None));
         }
     }
@@ -108,7 +109,7 @@ impl Index {
 
     /// Rows whose joints fit the point of `row` far better than its own, with their distance (m).
     fn fits(&self, data: &Measurements, standings: &[LeaveOneOut], row: usize, limit: f64) -> Vec<(usize, f64)> {
-        let point = data.position[row];
+        let Some(point) = data.point(row) else { return Vec::new() };
         let own = &standings[row];
         let typical = median_sigma(standings, row);
         let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / BETTER);

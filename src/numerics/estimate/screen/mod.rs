@@ -83,8 +83,8 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
     let moving = data.in_motion(options.rows);
     let apart = if moving { vec![0; data.rows()] } else { apart::apart(data, &predicted) };
     let plain = |row: &usize| {
-        let misread = || kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_some();
-        apart[*row] == 0 && !(data.whole(*row) && misread())
+        let misread = data.point(*row).and_then(|point| kind::misread(&point, &predicted[*row], NOMINAL_TOLERANCE));
+        apart[*row] == 0 && misread.is_none()
     };
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
     // Where the whole log slipped there is nothing else to fit.
