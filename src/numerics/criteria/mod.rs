@@ -15,6 +15,7 @@ mod table;
 
 pub mod choose;
 pub mod closed_form;
+pub mod effect;
 pub mod judge;
 pub mod noise;
 pub mod open_world;
@@ -32,6 +33,7 @@ pub use table::CriterionRow;
 pub const TABLES: &[&[CriterionRow]] = &[
     choose::ROWS,
     closed_form::ROWS,
+    effect::ROWS,
     judge::ROWS,
     noise::ROWS,
     open_world::ROWS,
@@ -62,6 +64,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable
     let rooms = [
         choose::SCALABLE,
         closed_form::SCALABLE,
+        effect::SCALABLE,
         judge::SCALABLE,
         noise::SCALABLE,
         open_world::SCALABLE,
