@@ -21,6 +21,7 @@ mod complete_runs;
 mod computed;
 mod conceal;
 mod covariance;
+mod criteria;
 mod curves;
 mod declared;
 mod desk;

@@ -2,6 +2,7 @@
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -38,7 +39,7 @@ impl Cause for AxisWobble {
                 [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
             })
         });
-        forms.map(|form| Hypothesis::new(form, 12).penalised(4.0).within(LARGEST)).collect()
+        forms.map(|form| Hypothesis::new(form, *WOBBLES).penalised(*RARE).within(LARGEST)).collect()
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

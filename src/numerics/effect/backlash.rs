@@ -4,16 +4,13 @@ use super::basis::around;
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
 };
+use crate::criteria::effect::{BENDS, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
 /// Lost motion by the side of approach or of the load.
 pub struct Backlash;
 
-/// -2 ln of the odds that lost motion grows with time, or that a joint yields otherwise from either side.
-const RARER: f64 = 4.0;
-/// -2 ln of the odds of another threshold than the friction that torques have shown.
-const OTHERWISE: f64 = 4.0;
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
 /// Smallest and largest threshold and blur, as shares of the joint's largest load: there the load or the approach decides alone.
@@ -62,7 +59,7 @@ impl Cause for Backlash {
             if survey.is_loaded(joint) {
                 let most = survey.load(joint);
                 let known = known(joint, survey).filter(|_| both);
-                let otherwise = if known.is_some() { OTHERWISE } else { 0.0 };
+                let otherwise = if known.is_some() { *RARE } else { 0.0 };
                 let widths = [1e-9, 0.03, 0.08].map(|share| by_load(joint, share * most));
                 out.extend(widths.map(|law| Hypothesis::new(form(law), 3).positive().penalised(otherwise)));
                 for friction_nm in known.into_iter().flat_map(|friction| [friction, -friction]) {
@@ -75,7 +72,7 @@ impl Cause for Backlash {
                     let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
                     for friction_nm in shares.into_iter().flat_map(|friction| [friction, -friction]) {
                         let laws = BLURS.map(|blur| mixed(joint, friction_nm, blur * friction_nm.abs()));
-                        let count = 10 * BLURS.len();
+                        let count = *BENDS * BLURS.len();
                         out.extend(laws.map(|law| Hypothesis::new(form(law), count).positive().penalised(otherwise)));
                     }
                 }
@@ -86,11 +83,11 @@ impl Cause for Backlash {
                 let [start, end] = survey.time;
                 if end > start {
                     let growing = side.times(Variable::Time, Basis::Creep { start, end, exponent: 1.0 });
-                    out.push(Hypothesis::new(form(growing), 2).penalised(RARER));
+                    out.push(Hypothesis::new(form(growing), 2).penalised(*RARE));
                 }
                 if survey.is_loaded(joint) {
                     let yielding = side.times(Variable::Load { joint }, Basis::PROPORTIONAL);
-                    out.push(Hypothesis::new(form(yielding), 2).penalised(RARER));
+                    out.push(Hypothesis::new(form(yielding), 2).penalised(*RARE));
                 }
             }
         }

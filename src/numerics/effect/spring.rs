@@ -5,6 +5,7 @@
 
 use super::form::parameters;
 use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable};
+use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -51,7 +52,7 @@ impl Spring {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs =
             joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(2.0)).collect()
+        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(*UNCOMMON)).collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.

@@ -1,6 +1,7 @@
 //! Which causes make up one finding: what one part of the arm does by one law, with the rest that its true shape leaves.
 
 use super::holder::stepped;
+use crate::criteria::words::{REFINEMENT, SLOW, TRACE};
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::FitState;
 use crate::effect::{
@@ -57,9 +58,9 @@ fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
         let main = gains
             .iter()
             .filter(|(main, gain)| {
-                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer[main].contains(&small.0);
+                let joins = main.1 == small.1 && *own < *REFINEMENT * **gain && finer[main].contains(&small.0);
                 // Both follow the side of the last move.
-                joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < TRACE * **gain)
+                joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < *TRACE * **gain)
             })
             .max_by(|a, b| a.1.total_cmp(b.1));
         if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
@@ -97,7 +98,7 @@ fn both_angles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize
     let is_part = |i: &usize| match (form(i).place(), form(i).term().map(Term::basis)) {
         (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
         (at, Some(Basis::Wave { order, .. })) if form(i).is(&GearCyclic) => {
-            at == Place::Joint(joint) && angles.contains(&joint) && order <= SLOW
+            at == Place::Joint(joint) && angles.contains(&joint) && order <= *SLOW
         }
         _ => false,
     };
@@ -107,9 +108,6 @@ fn both_angles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize
         groups.entry(main).or_default().extend(members);
     }
 }
-
-/// Orders that a smooth function of an angle may have, too.
-const SLOW: u32 = 2;
 
 /// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
 fn wobbles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
@@ -148,7 +146,3 @@ fn holders(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize], s
         groups.entry(tool).or_default().extend(members);
     }
 }
-
-/// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
-pub(super) const REFINEMENT: f64 = 0.1;
-const TRACE: f64 = 0.05;

@@ -2,14 +2,12 @@
 //!
 //! One target on the last body cannot separate a step of the last joint's zero from a displacement of the target about that axis.
 
+use crate::criteria::words::CONSTANT;
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::RivalCause;
 use crate::effect::{Basis, Clock, Form, Place, ToolShift, Variable, ZeroShift, figure};
 use crate::robot::{Measurements, Travel};
 use nalgebra::Vector3;
-
-/// The radius, and the place along the axis, may change by this share of the displacement.
-const CONSTANT: f64 = 0.1;
 
 /// A target that has turned about the last axis.
 pub(super) struct HolderTurn {
@@ -48,7 +46,7 @@ impl HolderTurn {
         let [along, radius] = [(to - from).dot(axis), axis.cross(&to).norm() - axis.cross(&from).norm()];
         let moved = (to - from).norm();
         let angle = axis.dot(&from.cross(&to)).atan2(axis.cross(&from).dot(&axis.cross(&to)));
-        let constant = along.abs().max(radius.abs()) < CONSTANT * moved;
+        let constant = along.abs().max(radius.abs()) < *CONSTANT * moved;
         constant.then_some(Self { angle, at: first, joint: joints - 1 })
     }
 

@@ -1,5 +1,6 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
+use crate::criteria::words::STILL;
 use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Place, Summary, Survey, cause, figure};
@@ -45,15 +46,12 @@ pub(super) fn left_out(summary: &Summary, rms: &str) -> String {
     )
 }
 
-/// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
-const STILL: f64 = 1e-3;
-
 /// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
 pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     let mut out = Vec::new();
     for (joint, reach) in reach.iter().enumerate() {
         let name = joint + 1;
-        if *reach < STILL {
+        if *reach < *STILL {
             out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
         } else if survey.travel(joint) < 0.02 {
             out.push(format!("joint {name}: it hardly moves; vary it over its range"));

@@ -1,13 +1,10 @@
 //! What the way of a moving arm is too short or too slow to show: there geometry takes up most of what depends on the speed.
 
 use super::last_round::LastRound;
+use crate::criteria::words::{CLOCKS, FOUND};
 use crate::effect::{Effect, JointLogLag, Place, Variable, ViscousWindup};
 use crate::units::Unit;
 
-/// Standard deviations from which on a cause is found.
-const FOUND: f64 = 5.0;
-/// Clocks that are apart by less (s) and joints that trail by less (s) are no cause to measure again.
-const CLOCKS: f64 = 1e-3;
 const TRAIL: f64 = 5.0 / 3600.0;
 
 /// Sentences for causes by speed that could be as large as usual and would not be found.
@@ -28,8 +25,8 @@ pub(super) fn by_speed(last: &LastRound) -> Vec<String> {
         let before: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
         // What cannot be seen at all has no standard error.
         let error = Some(pool.solve(&set).error(before)).filter(|error| *error > 0.0);
-        let limit = error.map_or(f64::INFINITY, |error| FOUND * error);
-        if clocks && limit > CLOCKS {
+        let limit = error.map_or(f64::INFINITY, |error| *FOUND * error);
+        if clocks && limit > *CLOCKS {
             out.push(format!("{}: clocks may be apart {}; {ADVICE}", form.name(), size(limit, Unit::Millisecond)));
         } else if !clocks && limit > TRAIL {
             joints.push(form.place().to_string());
