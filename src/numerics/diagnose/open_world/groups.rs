@@ -41,6 +41,11 @@ impl FreeGroup {
         self.motion.place()
     }
 
+    /// Whether time is one of its variables.
+    pub fn follows_time(&self) -> bool {
+        self.law.factors().any(|factor| factor.of == Variable::Time)
+    }
+
     /// As what may join the model: a law without a name.
     pub fn hypothesis(&self) -> Hypothesis {
         Hypothesis::new(Term::new(&Unknown, self.motion, self.law), 1)
