@@ -79,7 +79,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     if request.payloads.is_empty() {
         site.payloads = payloads(&data, &rows);
     }
-    let usual = median(rows.iter().map(|row| data.sigma[*row].x).collect());
+    let usual = median(rows.iter().map(|row| data.points.sigma[*row].x).collect());
     let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
@@ -219,8 +219,7 @@ fn as_fitted(data: &mut Measurements, prediction: &Prediction, predicted: &[Vect
         if seen.measured.is_some() || !(sigma.is_finite() && sigma > 0.0) {
             continue;
         }
-        data.position[row] = predicted[row] + Vector3::new(seen.dx_mm, seen.dy_mm, seen.dz_mm) * 1e-3;
-        data.sigma[row] = Vector3::repeat(sigma);
+        data.points.set(row, predicted[row] + Vector3::new(seen.dx_mm, seen.dy_mm, seen.dz_mm) * 1e-3, sigma);
         if !seen.held_out && !seen.suspect {
             rows.push(row);
         }

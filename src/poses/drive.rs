@@ -60,7 +60,8 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
         out.push(column(format!("dir{}", j + 1), 0, &|row| direction[row * n + j] * convention.sign()[j]));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
-        out.push(column(name.into(), 3, &|row| Unit::Millimetre.from_si(poses.position[row][axis])));
+        let values = poses.points.position.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect();
+        out.push(DriveColumn { name: name.into(), values, decimals: 3 });
     }
     out
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
 use crate::identified::robot_file;
-use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::robot::{JointConvention, Measurements, PointReadings, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -71,7 +71,7 @@ pub fn proposal<'a>(
     let shown = request.sigma.or(usual.map(|sigma| sigma * 1e3)).unwrap_or(SIGMA);
     let sigma = shown * 1e-3;
     // As if measured like the proposed poses: these are compared, not their instruments.
-    recording.iter_mut().for_each(|(data, _)| data.sigma = vec![Vector3::repeat(sigma); data.rows()]);
+    recording.iter_mut().for_each(|(data, _)| data.points.sigma = vec![Vector3::repeat(sigma); data.rows()]);
     let proposal = propose(model(), &site, &wish(request, aim, sigma)).map_err(|fault| Error::spec(place, fault))?;
     let score = |data: &Measurements| proposal.jacobian.score(&model(), data, &proposal.workspace);
     let recorded = recording.as_ref().map(|(data, _)| score(data));
@@ -102,8 +102,7 @@ fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
     let data = Measurements {
         joints: robot.joints(),
         q: vec![0.0; robot.joints()],
-        position: vec![Vector3::zeros()],
-        sigma: vec![Vector3::zeros()],
+        points: PointReadings::new(vec![Vector3::zeros()], 0.0),
         payload: vec![heaviest],
         ..Measurements::default()
     };

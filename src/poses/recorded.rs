@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// The usual standard deviation of an axis, m; none where no point was measured, or nobody stated it.
 pub(super) fn usual_sigma(data: &Measurements) -> Option<f64> {
-    let measured: Vec<f64> = data.sigma.iter().flatten().copied().filter(|sigma| sigma.is_finite()).collect();
+    let measured: Vec<f64> = data.points.sigma.iter().flatten().copied().filter(|sigma| sigma.is_finite()).collect();
     let stated = data.noise_basis != NoiseBasis::Inferred && !measured.is_empty();
     stated.then(|| median(measured))
 }

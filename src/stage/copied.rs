@@ -12,10 +12,7 @@ pub(super) fn copied_rows(recording: &Recording) -> Vec<(usize, usize)> {
     let mut first: BTreeMap<(Vec<u64>, Option<&str>), usize> = BTreeMap::new();
     let mut copies = Vec::new();
     for row in 0..recording.rows() {
-        let point = recording.position[row];
-        if !point.iter().all(|axis| axis.is_finite()) {
-            continue;
-        }
+        let Some(point) = recording.point(row) else { continue };
         let values = recording.q(row).iter().chain(&point).map(|value| value.to_bits()).collect();
         let target = recording.target.as_ref().and_then(|all| all[row].as_deref());
         match first.entry((values, target)) {

@@ -50,10 +50,12 @@ pub(super) fn curves(
     let mut scratch = model.stack.scratch(&model.robot);
     let mut derivatives = vec![Vector3::zeros(); specs.len()];
     for &row in &shown {
+        // A curve is drawn along the displacement of a point.
+        let Some(measured) = data.point(row) else { continue };
         derivatives.fill(Vector3::zeros());
         model.stack.derivatives(&model.robot, data, row, &model.x, &mut scratch, |k, derivative| derivatives[k] += derivative);
         let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
-        let residual = data.position[row] - whole[row];
+        let residual = measured - whole[row];
         for (finding, out) in traced.iter().zip(&mut rows) {
             let Some((direction, scale)) = finding.direction(row, &motion, model) else { continue };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;

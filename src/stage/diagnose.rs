@@ -96,7 +96,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 24;
+    const IMPLEMENTATION: u32 = 25;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 

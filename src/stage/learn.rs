@@ -236,7 +236,7 @@ impl Stage for Learn {
         let mut rows = split.rows(&recording, &self.on)?;
         // What is learnt are displacements of points: rows of fewer axes or of distances have none.
         let asked = rows.len();
-        rows.retain(|row| recording.is_whole(*row));
+        rows.retain(|row| recording.point(*row).is_some());
         if rows.is_empty() && asked > 0 {
             let message =
                 format!("learn corrects points: none of the {asked} rows to learn from measured a whole point (x, y, z)");

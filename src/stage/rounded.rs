@@ -29,7 +29,7 @@ struct Rounding {
 /// What is said of rounded joints and points, a sentence each, where rounding is as large as what the model leaves.
 pub(super) fn rounded_logs(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<String> {
     let predicted = model.predict(data);
-    let left = rms(rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()));
+    let left = rms(rows.iter().map(|row| data.points.residual(*row, &predicted[*row]).norm()));
     let noise = rms(rows.iter().map(|row| data.noise(*row)));
     let said = |rounding: Rounding| {
         let Rounding { what, rms, most } = rounding;
@@ -104,7 +104,7 @@ fn joints(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Rounding
 
 fn points(data: &Measurements, rows: &[usize]) -> Option<Rounding> {
     let axis = |axis: usize| {
-        let values: Vec<f64> = rows.iter().map(|row| Unit::Millimetre.from_si(data.position[*row][axis])).collect();
+        let values: Vec<f64> = rows.iter().filter_map(|row| Some(Unit::Millimetre.from_si(data.point(*row)?[axis]))).collect();
         step(&values)
     };
     // A point is as coarse as its finest axis says: one axis may be a multiple by chance.

@@ -137,9 +137,9 @@ impl Transfer {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let there = earlier.model(robot.clone(), &[], self.load.into())?;
         let predicted = there.predict(data);
-        let whole: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
-        let points = |of: &[nalgebra::Vector3<f64>]| whole.iter().map(|row| of[*row]).collect::<Vec<_>>();
-        let base = align_points(&points(&predicted), &points(&data.position)) * there.base();
+        let points = rows.iter().filter_map(|row| Some((predicted[*row], data.point(*row)?)));
+        let (carried, measured): (Vec<_>, Vec<_>) = points.unzip();
+        let base = align_points(&carried, &measured) * there.base();
         earlier.model_standing(base, robot, &[], self.load.into())
     }
 
@@ -209,7 +209,6 @@ fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Reco
     let mut visited = others.next()?.measurements();
     for more in others.map(Recording::measurements) {
         visited.q.extend(more.q);
-        visited.position.extend(more.position);
         visited.payload.extend(more.payload);
         visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
     }

@@ -88,6 +88,7 @@ mod motion;
 mod network;
 mod observability;
 mod parameters;
+mod point;
 mod prediction;
 mod recording;
 mod rejected;

@@ -25,6 +25,8 @@ crate::table::rows! { "parameters",
         remark: Option<String>,
         /// The effect's place and shape as JSON, for effects that a diagnosis added; null for effects of the whole arm.
         form: Option<String>,
+        /// `outside_simulation` where the parameters say nothing of the robot file; else null.
+        corrects: Option<String>,
     }
 }
 
@@ -50,15 +52,10 @@ pub enum Corrected {
 }
 
 impl Corrected {
-    /// The first sentence of the remarks that say so.
-    const OUTSIDE: &str = "corrects the outside simulation, not the robot file's model";
-
-    fn of(row: &ParameterRow) -> Self {
-        match row.remark.as_deref().and_then(|remark| remark.split("; ").next()) {
-            Some(Self::OUTSIDE) => Self::OutsideSimulation,
-            _ => Self::RobotFile,
-        }
-    }
+    /// As the column holds what does not correct the robot file.
+    const OUTSIDE: &str = "outside_simulation";
+    /// What people read of it.
+    const REMARK: &str = "corrects the outside simulation, not the robot file's model";
 }
 
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
@@ -136,6 +133,7 @@ impl Parameters {
                     step: step.into(),
                     remark,
                     form: form.clone(),
+                    corrects: None,
                 });
             }
         }
@@ -153,12 +151,13 @@ impl Parameters {
         self
     }
 
-    /// The same, with what they correct in their remarks.
+    /// The same, with what they correct, which their remarks tell people.
     pub fn correcting(mut self, corrected: Corrected) -> Self {
         if corrected == Corrected::OutsideSimulation {
-            let outside = Corrected::OUTSIDE;
             for row in &mut self.0 {
-                row.remark = Some(row.remark.take().map_or_else(|| outside.into(), |remark| format!("{outside}; {remark}")));
+                row.corrects = Some(Corrected::OUTSIDE.into());
+                let remarks = [Some(Corrected::REMARK.to_string()), row.remark.take()];
+                row.remark = Some(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
             }
         }
         self
@@ -166,8 +165,8 @@ impl Parameters {
 
     /// What these correct: of an outside simulation they say nothing of the robot file's model.
     pub fn corrected(&self) -> Corrected {
-        let outside = self.0.iter().map(Corrected::of).find(|corrected| *corrected == Corrected::OutsideSimulation);
-        outside.unwrap_or(Corrected::RobotFile)
+        let outside = self.0.iter().any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE));
+        if outside { Corrected::OutsideSimulation } else { Corrected::RobotFile }
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
@@ -334,7 +333,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_corrected_is_the_first_sentence_of_a_remark_and_no_other() {
+    fn what_is_corrected_is_a_column_whatever_a_remark_says() {
         let row = |remark: Option<&str>| ParameterRow {
             name: "joint_offset.j2".into(),
             effect: "joint_offset".into(),
@@ -348,6 +347,7 @@ mod tests {
             step: "diagnose".into(),
             remark: remark.map(String::from),
             form: None,
+            corrects: None,
         };
         let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
         for remark in [None, Some("moves with another")] {
@@ -357,7 +357,6 @@ mod tests {
             let outside = bare.correcting(Corrected::OutsideSimulation);
             assert_eq!(outside.with_advice(&advice).corrected(), Corrected::OutsideSimulation);
         }
-        let mentioned = format!("not so: {}", Corrected::OUTSIDE);
-        assert_eq!(Parameters(vec![row(Some(&mentioned))]).corrected(), Corrected::RobotFile);
+        assert_eq!(Parameters(vec![row(Some(Corrected::REMARK))]).corrected(), Corrected::RobotFile);
     }
 }

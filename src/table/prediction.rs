@@ -72,11 +72,11 @@ impl Prediction {
         let rows = predicted.iter().enumerate().map(|(row, point)| {
             let point = point * 1e3;
             let error = errors.next();
-            let whole = data.whole(row);
-            let residual = if whole {
-                data.position[row] * 1e3 - point
-            } else {
-                error.as_ref().map_or_else(Vector3::zeros, |error| error.point * 1e3)
+            let measured_point = data.point(row);
+            let whole = measured_point.is_some();
+            let residual = match measured_point {
+                Some(measured) => measured * 1e3 - point,
+                None => error.as_ref().map_or_else(Vector3::zeros, |error| error.point * 1e3),
             };
             PredictionRow {
                 sequence: recording.sequence[row],
@@ -113,10 +113,10 @@ impl Prediction {
     pub fn is_of(&self, recording: &Recording) -> bool {
         let measured = |row: &PredictionRow| [row.x_mm + row.dx_mm, row.y_mm + row.dy_mm, row.z_mm + row.dz_mm];
         let is = |at: usize, row: &PredictionRow| {
-            let apart = || measured(row).into_iter().zip(recording.position[at]).map(|(own, point)| (own - point * 1e3).abs());
+            let near = |point: [f64; 3]| measured(row).into_iter().zip(point).all(|(own, m)| (own - m * 1e3).abs() < ROUNDING_MM);
             row.sequence == recording.sequence[at]
                 && row.point_id == recording.point_id[at]
-                && (row.measured.is_some() || apart().all(|apart| apart < ROUNDING_MM))
+                && (row.measured.is_some() || recording.point(at).is_some_and(near))
         };
         self.0.len() == recording.rows() && self.0.iter().enumerate().all(|(at, row)| is(at, row))
     }

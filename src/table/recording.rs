@@ -2,11 +2,11 @@
 
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, START, Sequence, SigmaSource, law_columns};
+use crate::robot::{CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, Sequence, SigmaSource, law_columns};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
+use crate::table::point::{is_whole, points};
 use crate::units::Unit;
-use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// All columns, in the order in which people see them: circumstances, and what kinds of measurement own.
@@ -74,20 +74,7 @@ impl Recording {
     /// What the numerics need; a point without a standard deviation has the weight that one starts from.
     pub fn measurements(&self) -> Measurements {
         let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
-        let position: Vec<Vector3<f64>> =
-            self.position.iter().map(|point| Vector3::from_iterator(point.iter().map(measured))).collect();
-        let own = |row: usize, axis: usize| self.position_sigma.as_ref().map(|all| all[row][axis]).filter(|own| *own > 0.0);
-        let there = |row: usize, axis: usize| self.position[row][axis].is_finite();
-        let sigma = |row: usize, axis: usize| match there(row, axis) {
-            true => own(row, axis).unwrap_or_else(|| START.sigma(&position[row])),
-            false => f64::INFINITY,
-        };
-        let sigma = (0..position.len()).map(|row| Vector3::from_fn(|axis, _| sigma(row, axis))).collect();
-        let inferred = |row: usize| {
-            let source = self.sigma_source.as_ref().is_some_and(|all| all[row] == SigmaSource::Inferred);
-            (0..3).any(|axis| there(row, axis) && (source || own(row, axis).is_none()))
-        };
-        let is_inferred = (0..position.len()).any(inferred);
+        let (points, is_inferred) = points(&self.position, self.position_sigma.as_deref(), self.sigma_source.as_deref());
         let payload = match &self.payload {
             Some(all) => all.iter().map(measured).collect(),
             None => vec![0.0; self.rows()],
@@ -95,8 +82,7 @@ impl Recording {
         let mut data = Measurements {
             joints: self.joints,
             q: self.q.clone(),
-            position,
-            sigma,
+            points,
             payload,
             current: self.current.clone(),
             time: self.time.clone(),
@@ -130,9 +116,9 @@ impl Recording {
         settings.filter_map(|column| self.names.get(column.setting)?.get(row)?.as_deref()).next()
     }
 
-    /// Whether all three axes of a row's point were measured.
-    pub fn is_whole(&self, row: usize) -> bool {
-        self.position.get(row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()))
+    /// The point of a row (m) where all three of its axes were measured.
+    pub fn point(&self, row: usize) -> Option<[f64; 3]> {
+        self.position.get(row).copied().filter(is_whole)
     }
 }
 

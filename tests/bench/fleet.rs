@@ -58,7 +58,7 @@ fn recording(case: &Case) -> Recording {
         point_id: (0..case.data.rows()).map(|row| format!("{row}")).collect(),
         usage: vec![None; case.data.rows()],
         q: case.data.q.clone(),
-        position: case.data.position.iter().map(|point| [point.x, point.y, point.z]).collect(),
+        position: case.data.points.position.iter().map(|point| [point.x, point.y, point.z]).collect(),
         payload: Some(case.data.payload.clone()),
         ..Recording::default()
     }

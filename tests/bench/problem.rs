@@ -4,7 +4,7 @@ use crate::fixture;
 use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::effect::{EffectContext, EffectStack, Load, identified};
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use rand::rngs::ChaCha8Rng;
@@ -48,13 +48,12 @@ impl Case {
         let mut data = Measurements {
             joints: robot.joints(),
             q: fixture::poses(&description, rows),
-            position: vec![Vector3::zeros(); rows],
-            sigma: vec![Vector3::repeat(SIGMA); rows],
+            points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
             payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
             ..Measurements::default()
         };
-        data.position = truth.predict(&data);
-        for point in &mut data.position {
+        data.points.position = truth.predict(&data);
+        for point in &mut data.points.position {
             *point += Vector3::from_fn(|_, _| spread(SIGMA));
         }
         Self { robot, data, effects, rows: (0..rows).collect() }
@@ -73,6 +72,7 @@ impl Case {
             motor_constant: None,
             mass: joint["mass"].as_f64(),
             centre: Some(vector(&joint["centre"])),
+            coulomb: None,
         });
         let couplings = robot["couplings"].as_array().expect("couplings").iter().map(|coupling| Coupling {
             moved: coupling["moved"].as_u64().expect("moved") as usize,
@@ -95,9 +95,8 @@ impl Case {
         let data = Measurements {
             joints: description.joints.len(),
             q: numbers(&value["q"]),
-            sigma: vec![Vector3::repeat(sigma); position.len()],
             payload: vec![0.0; position.len()],
-            position,
+            points: PointReadings::new(position, sigma),
             ..Measurements::default()
         };
         let effects = value["effects"].as_array().expect("effects").iter().filter_map(|name| Some(name.as_str()?.to_string()));

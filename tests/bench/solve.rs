@@ -24,7 +24,7 @@ pub fn solve(file: &str) {
     let (model, fitted) = case.fit();
     let predicted = model.predict(&case.data);
     let held_out = case.rows.len()..case.data.rows();
-    let errors: Vec<f64> = held_out.map(|row| (predicted[row] - case.data.position[row]).norm_squared()).collect();
+    let errors: Vec<f64> = held_out.map(|row| (predicted[row] - case.data.points.position[row]).norm_squared()).collect();
     let rms = (errors.iter().sum::<f64>() / errors.len() as f64).sqrt();
     println!(
         "{}",

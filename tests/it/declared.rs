@@ -5,7 +5,7 @@ use calib::effect::{
     Axes, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion, Polar,
     ShapeRange, Starts, Survey, Term, Variable, cause,
 };
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 
@@ -17,9 +17,8 @@ fn data(robot: &RobotModel) -> Measurements {
     let base = Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0));
     Measurements {
         joints: n,
-        position: q.chunks(n).map(|q| base.point(&robot.forward(q).translation)).collect(),
+        points: PointReadings::new(q.chunks(n).map(|q| base.point(&robot.forward(q).translation)).collect(), 1e-5),
         q,
-        sigma: vec![Vector3::repeat(1e-5); ROWS],
         payload: (0..ROWS).map(|row| [0.0, 4.0, 10.0][row % 3]).collect(),
         temperature: Some((0..ROWS).map(|row| 20.0 + 0.3 * row as f64).collect()),
         time: Some((0..ROWS).map(|row| 12.0 * row as f64).collect()),

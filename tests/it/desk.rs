@@ -2,7 +2,7 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
+    Context, ErasedStage, Input, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
 use calib::table::Table;
@@ -39,7 +39,9 @@ impl Desk {
         stage: &dyn ErasedStage,
         frames: Vec<Vec<(String, Frame)>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
-        self.written(&(entry.writes)(), |context| stage.run(frames, context))
+        let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as Input);
+        let inputs = frames.into_iter().map(|port| port.into_iter().map(input).collect()).collect();
+        self.written(&(entry.writes)(), |context| stage.run(inputs, context))
     }
     fn written(
         &self,

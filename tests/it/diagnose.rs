@@ -17,7 +17,7 @@ use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Effect, Form, Load};
 use calib::estimate::choose::{Site, median};
 use calib::estimate::{FitOptions, Model, fit};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::stage::{Diagnose, DiagnoseReads};
 use calib::table::{Findings, ParameterRow, Parameters, Prediction, Recording, Robot, Verdict};
 use nalgebra::Vector3;
@@ -355,10 +355,10 @@ fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
 /// What is left, squared and over the noise, of points that `truth` makes where `other` is fitted to them in all that is `free`.
 fn left(truth: &Model, other: &Model, free: &[usize], data: &Measurements) -> f64 {
     let mut data = data.clone();
-    data.position = truth.predict(&data);
+    data.points.position = truth.predict(&data);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let (fitted, _) = fit(other, &data, &FitOptions { rows: &rows, candidates: free });
-    let off = fitted.predict(&data).into_iter().zip(&data.position).zip(&data.sigma);
+    let off = fitted.predict(&data).into_iter().zip(&data.points.position).zip(&data.points.sigma);
     off.map(|((model, point), sigma)| (model - point).component_div(sigma).norm_squared()).sum()
 }
 
@@ -368,14 +368,7 @@ fn joined(data: &Measurements, rows: &[usize], more: &Measurements, sigma: f64) 
     let payload: Vec<f64> = rows.iter().map(|row| data.payload[*row]).chain(more.payload.iter().copied()).collect();
     let count = payload.len();
     let position = vec![Vector3::zeros(); count];
-    Measurements {
-        joints: data.joints,
-        q,
-        payload,
-        position,
-        sigma: vec![Vector3::repeat(sigma); count],
-        ..Measurements::default()
-    }
+    Measurements { joints: data.joints, q, payload, points: PointReadings::new(position, sigma), ..Measurements::default() }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{Effect, EffectContext, EffectStack, Load, ParameterSpec, identified};
-use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
+use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -16,8 +16,7 @@ fn data(robot: &RobotModel, rows: usize) -> Measurements {
     Measurements {
         joints: n,
         q: fixture::poses(robot.description(), rows),
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(1e-5); rows],
+        points: PointReadings::new(vec![Vector3::zeros(); rows], 1e-5),
         payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { 10.0 }).collect(),
         current: Some((0..rows * n).map(|k| 5.0 * fixture::spread(k, 3) - 2.0).collect()),
         ..Measurements::default()

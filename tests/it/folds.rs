@@ -37,8 +37,9 @@ fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
         random.extend(found.random);
         blocks.extend(found.blocks);
         let (model, _) = identify(&data, &effects);
-        training
-            .extend(model.predict(&data).iter().zip(&data.position).map(|(predicted, measured)| (measured - predicted).norm()));
+        training.extend(
+            model.predict(&data).iter().zip(&data.points.position).map(|(predicted, measured)| (measured - predicted).norm()),
+        );
     }
     // 33 parameters from 64 points of three values.
     let expected = SIGMA * 3f64.sqrt() * f64::sqrt(1.0 + 33.0 / (192.0 - 34.0));
@@ -55,7 +56,7 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
     for (seed, outlier) in [(230, 0.0), (231, 6e-4)] {
         let (mut data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
-        data.position[33].x += outlier;
+        data.points.position[33].x += outlier;
         let found = folds(&data, &effects, 5).expect("enough poses").blocks;
         let robot = RobotModel::new(fixture::offset_wrist());
         let mut differences = Vec::new();
@@ -65,8 +66,9 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
             let candidates: Vec<usize> = (0..start.x.len()).collect();
             let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
             let predicted = model.predict(&data);
-            differences
-                .extend((16 * block..16 * (block + 1)).map(|row| found[row] - (data.position[row] - predicted[row]).norm()));
+            differences.extend(
+                (16 * block..16 * (block + 1)).map(|row| found[row] - (data.points.position[row] - predicted[row]).norm()),
+            );
         }
         let off = rms(&differences) / (SIGMA * 3f64.sqrt());
         println!("folds against refits: {off:.1e} of the noise");
@@ -79,8 +81,8 @@ fn rows_of_one_pose_are_never_on_both_sides() {
     let (once, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 5);
     let mut twice = once.clone();
     twice.q.extend_from_within(..);
-    twice.position.extend_from_within(..);
-    twice.sigma.extend_from_within(..);
+    twice.points.position.extend_from_within(..);
+    twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
     let (one, two) = (folds(&once, &GEOMETRY, 6).expect("poses"), folds(&twice, &GEOMETRY, 6).expect("poses"));
     // A row whose twin was fitted would be predicted far better.
@@ -152,13 +154,13 @@ fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
         let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
         let candidates: Vec<usize> = (0..start.x.len()).collect();
         let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
-        let error = (data.position[left] - model.predict(&data)[left]).norm();
+        let error = (data.points.position[left] - model.predict(&data)[left]).norm();
         assert!((found.random[left] - error).abs() < 0.02 * SIGMA, "{left}: {:e} for {error:e}", found.random[left]);
     }
     let mut twice = data.clone();
     twice.q.extend_from_within(..);
-    twice.position.extend_from_within(..);
-    twice.sigma.extend_from_within(..);
+    twice.points.position.extend_from_within(..);
+    twice.points.sigma.extend_from_within(..);
     twice.payload.extend_from_within(..);
     assert_eq!(one_out(&twice).expect("enough poses").count, 40, "a pose that is measured twice is one");
     let (few, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 8, 5);

@@ -5,7 +5,7 @@ use calib::effect::{
     CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, ParameterSpec, Place, Summary,
     Survey, cause, hypotheses, people, whole,
 };
-use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
+use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -24,8 +24,7 @@ fn data(robot: &RobotModel, moving: bool) -> Measurements {
     Measurements {
         joints: n,
         q: q.clone(),
-        position: q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(),
-        sigma: vec![Vector3::repeat(1e-5); ROWS],
+        points: PointReadings::new(q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(), 1e-5),
         payload: (0..ROWS).map(|row| [0.0, 4.0, 10.0][row % 3]).collect(),
         current: Some(spread(3, ROWS * n).map(|value| 5.0 * value).collect()),
         direction: Some(spread(5, ROWS * n).map(f64::signum).collect()),

@@ -11,7 +11,7 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
-use calib::robot::{MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
+use calib::robot::{MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -62,18 +62,17 @@ impl Cell {
         let mut data = Measurements {
             joints,
             q: (0..rows).flat_map(|row| q[row / count * joints..(row / count + 1) * joints].to_vec()).collect(),
-            position: vec![Vector3::zeros(); rows],
-            sigma: vec![Vector3::repeat(SIGMA); rows],
+            points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
             payload: vec![0.0; rows],
             target: (!names.is_empty()).then(|| Named::of((0..rows).map(|row| names[row % count]))),
             ..Measurements::default()
         };
-        data.position = self.truth.predict(&data);
+        data.points.position = self.truth.predict(&data);
         data
     }
 
     fn disturb(&self, data: &mut Measurements) {
-        for (row, point) in data.position.iter_mut().enumerate() {
+        for (row, point) in data.points.position.iter_mut().enumerate() {
             *point += Vector3::from_fn(|axis, _| SIGMA * self.noise(3 * row + axis));
         }
     }
@@ -143,7 +142,7 @@ fn free(fitted: &Fitted) -> usize {
 
 /// Mean square of what predictions miss the truth by over what their sigma says.
 fn honesty(model: &Model, fitted: &Fitted, at: &Measurements) -> f64 {
-    let off: f64 = model.predict(at).iter().zip(&at.position).map(|(a, b)| (a - b).norm_squared()).sum();
+    let off: f64 = model.predict(at).iter().zip(&at.points.position).map(|(a, b)| (a - b).norm_squared()).sum();
     let sigma = fitted.covariance.as_ref().expect("not singular").of_predictions(model, at);
     off / sigma.iter().map(|sigma| sigma * sigma).sum::<f64>()
 }
@@ -161,7 +160,7 @@ fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
         assert_eq!(free(&fitted), axes + 9, "{name}");
         assert!(fitted.clusters == 60, "{name}: rows of a pose stay together, {} clusters", fitted.clusters);
         let fresh = cell.rows(60, 1);
-        let off = model.predict(&fresh).iter().zip(&fresh.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let off = model.predict(&fresh).iter().zip(&fresh.points.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(off < 5.0 * SIGMA, "{name}: new poses are off by {off:e} m");
     }
 }
@@ -220,8 +219,8 @@ fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
     let cell = Cell::new(fixture::offset_wrist(), &[], 6);
     let mut data = cell.rows(200, 0);
     cell.reach(&mut data, &[("", cell.truth.base().point(&Vector3::new(-0.9, 1.6, -0.5)))], 2e-5);
-    data.position.fill(Vector3::zeros());
-    data.sigma.fill(Vector3::repeat(f64::INFINITY));
+    data.points.position.fill(Vector3::zeros());
+    data.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = cell.fit(&data, nothing);
     assert_eq!(free(&fitted), 27 + 3 - 6);
     let off: Vec<f64> = model.row_errors(&data).iter().map(|error| error.length).collect();
@@ -258,10 +257,10 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     let spoilt = |row: usize| row >= 60;
     for row in (0..120).filter(|row| spoilt(*row)) {
         // What was not measured must not matter.
-        data.position[row].x = 0.0;
-        data.position[row].y = 0.0;
-        data.sigma[row].x = f64::INFINITY;
-        data.sigma[row].y = f64::INFINITY;
+        data.points.position[row].x = 0.0;
+        data.points.position[row].y = 0.0;
+        data.points.sigma[row].x = f64::INFINITY;
+        data.points.sigma[row].y = f64::INFINITY;
     }
     let (model, fitted) = cell.fit(&data, nothing);
     assert_eq!(free(&fitted), 27);
@@ -269,8 +268,7 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     let only: Vec<usize> = (0..60).collect();
     let half = Measurements {
         q: data.q[..60 * 6].to_vec(),
-        position: only.iter().map(|row| data.position[*row]).collect(),
-        sigma: vec![Vector3::repeat(SIGMA); 60],
+        points: PointReadings::new(only.iter().map(|row| data.points.position[*row]).collect(), SIGMA),
         payload: vec![0.0; 60],
         joints: 6,
         ..Measurements::default()
@@ -283,7 +281,7 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     };
     let [all, some, none] = [&whole, &fitted, &few].map(sigma);
     assert!(all < some && some < none, "more axes tell more: {all:e}, {some:e}, {none:e}");
-    let off = model.predict(&fresh).iter().zip(&fresh.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let off = model.predict(&fresh).iter().zip(&fresh.points.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(off < 4.0 * SIGMA, "new poses are off by {off:e} m");
 }
 
@@ -300,8 +298,8 @@ fn what_is_said_of_predictions_is_what_they_are_off_by_whatever_was_measured() {
         ("heights", |cell| {
             let mut data = cell.rows(60, 0);
             for row in (0..data.rows()).filter(|row| row % 3 != 0) {
-                data.sigma[row].x = f64::INFINITY;
-                data.sigma[row].y = f64::INFINITY;
+                data.points.sigma[row].x = f64::INFINITY;
+                data.points.sigma[row].y = f64::INFINITY;
             }
             data
         }),

@@ -4,7 +4,7 @@ use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 
@@ -80,13 +80,12 @@ fn recording_drawn(
     let mut data = Measurements {
         joints: robot.joints(),
         q: fixture::poses(description, rows),
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(SIGMA); rows],
+        points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
         payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
         ..Measurements::default()
     };
-    data.position = truth.predict(&data);
-    for (row, point) in data.position.iter_mut().enumerate() {
+    data.points.position = truth.predict(&data);
+    for (row, point) in data.points.position.iter_mut().enumerate() {
         *point += Vector3::from_fn(|axis, _| SIGMA * normal(7_777 + 31 * seed + 1_000_000 * (seed + 1) + 3 * row + axis));
     }
     (data, truth)
@@ -102,7 +101,7 @@ fn identify(data: &Measurements, description: &RobotDescription, effects: &[&str
 
 fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {
     let predicted = model.predict(data);
-    let squares: Vec<f64> = rows.map(|row| (data.position[row] - predicted[row]).norm_squared()).collect();
+    let squares: Vec<f64> = rows.map(|row| (data.points.position[row] - predicted[row]).norm_squared()).collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
@@ -169,7 +168,7 @@ fn a_few_gross_outliers_do_not_move_the_fit() {
     let (mut data, _) = recording(&description, &GEOMETRY, 160, 3);
     let rows: Vec<usize> = (0..120).collect();
     for row in [5, 40, 77] {
-        data.position[row] += Vector3::new(0.3, -0.1, 0.8);
+        data.points.position[row] += Vector3::new(0.3, -0.1, 0.8);
     }
     let (model, fitted) = identify(&data, &description, &GEOMETRY, &rows);
     let held_out = rms(&model, &data, 120..160);
@@ -184,7 +183,7 @@ fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
     let robot = RobotModel::new(description.clone());
     let mut data = recording(&description, &[], 100, 4).0;
-    data.position = model(&robot, Pose::identity(), &[]).predict(&data);
+    data.points.position = model(&robot, Pose::identity(), &[]).predict(&data);
     let rows: Vec<usize> = (0..100).collect();
     let (model, fitted) = identify(&data, &description, &effects, &rows);
     let k = model.stack.specs().iter().position(|spec| spec.name == "reduction_ratio.j6").expect("joint 6");

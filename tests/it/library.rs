@@ -11,7 +11,7 @@ use calib::diagnose::VerdictKind;
 use calib::effect::{Effect, EffectContext, EffectStack, GearCyclic, Load, Place, whole};
 use calib::estimate::Model;
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -28,8 +28,7 @@ fn rows(robot: &RobotModel, count: usize) -> Measurements {
     Measurements {
         joints: robot.joints(),
         q: fixture::poses(robot.description(), count),
-        position: vec![Vector3::zeros(); count],
-        sigma: vec![Vector3::repeat(NOISE); count],
+        points: PointReadings::new(vec![Vector3::zeros(); count], NOISE),
         payload: vec![0.0; count],
         ..Measurements::default()
     }
@@ -43,9 +42,9 @@ fn an_arm_is_identified_from_arrays() {
     let mut truth = model(&robot, base(), &["joint_offset"]);
     let third = truth.stack.specs().iter().position(|spec| spec.name == "joint_offset.j3").expect("a zero");
     truth.x[third] = 1.5e-3;
-    data.position = truth.predict(&data);
+    data.points.position = truth.predict(&data);
     let noisy = |(row, point): (usize, &Vector3<f64>)| [0, 1, 2].map(|axis: usize| point[axis] + NOISE * normal(3 * row + axis));
-    let points: Vec<[f64; 3]> = data.position.iter().enumerate().map(noisy).collect();
+    let points: Vec<[f64; 3]> = data.points.position.iter().enumerate().map(noisy).collect();
     let q: Vec<Vec<f64>> = data.q.chunks(robot.joints()).map(<[f64]>::to_vec).collect();
     let found = identify::identify(&text, &q, &points).expect("enough rows");
     let zero = found.iter().find(|one| one.name == "joint_offset.j3").expect("the zero of joint 3");
@@ -64,8 +63,8 @@ fn missing_physics_is_named_from_arrays() {
     let mut truth = Model::nominal(robot.clone(), EffectStack::new(&robot, base(), effects));
     let sine = truth.x.len() - 2;
     truth.x[sine] = 1e-4;
-    data.position = truth.predict(&data);
-    for (k, point) in data.position.iter_mut().enumerate() {
+    data.points.position = truth.predict(&data);
+    for (k, point) in data.points.position.iter_mut().enumerate() {
         *point += Vector3::new(normal(3 * k), normal(3 * k + 1), normal(3 * k + 2)) * NOISE;
     }
     let said = diagnose::missing_physics(&robot, &data);

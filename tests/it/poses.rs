@@ -93,8 +93,8 @@ fn scatter(robot: &RobotDescription, poses: &Measurements, free: &[usize], scale
                 1e-4 * normal() * if truth.stack.specs()[*parameter].name.contains("compliance") { 1e-3 } else { 1.0 };
         }
         let mut data = poses.clone();
-        data.position = truth.predict(&data);
-        data.position.iter_mut().for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
+        data.points.position = truth.predict(&data);
+        data.points.position.iter_mut().for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
         let (fitted, outcome) = fit(&model(robot, &effects), &data, &FitOptions { rows: &rows, candidates: free });
         for (k, parameter) in free.iter().enumerate() {
             assert!(
@@ -155,7 +155,7 @@ fn limits_box_floor_and_payloads_are_kept() {
         let q = proposal.poses.q(row);
         assert!(q.iter().zip(&site.ranges).all(|(value, [lower, upper])| (lower..=upper).contains(&value)));
         let point = nominal.forward(q).translation;
-        assert!((point - proposal.poses.position[row]).norm() < 1e-12);
+        assert!((point - proposal.poses.points.position[row]).norm() < 1e-12);
         assert!((0.4..=2.5).contains(&point.x) && point.y.abs() <= 1.2 && (0.5..=2.3).contains(&point.z));
         assert!(site.payloads.contains(&proposal.poses.payload[row]));
     }

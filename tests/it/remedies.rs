@@ -27,7 +27,7 @@ fn remedy(description: &RobotDescription, data: &Measurements, effects: &[&str],
 fn nominal(description: &RobotDescription, bend: impl Fn(&mut Measurements)) -> Measurements {
     let (mut data, truth) = recording(description, &[], 120, 3);
     bend(&mut data);
-    data.position = truth.predict(&data);
+    data.points.position = truth.predict(&data);
     data
 }
 

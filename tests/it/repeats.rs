@@ -5,7 +5,7 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Poses, align, fit, spread};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{Observability, Parameters, Split};
 use nalgebra::Vector3;
@@ -21,8 +21,7 @@ fn visited(poses: usize, visits: usize, rows: usize, joint_sigma: f64, seed: usi
     let count = poses * visits * rows;
     let mut data = Measurements {
         joints: once.joints,
-        position: vec![Vector3::zeros(); count],
-        sigma: vec![Vector3::repeat(SIGMA); count],
+        points: PointReadings::new(vec![Vector3::zeros(); count], SIGMA),
         payload: vec![0.0; count],
         ..Measurements::default()
     };
@@ -35,9 +34,9 @@ fn visited(poses: usize, visits: usize, rows: usize, joint_sigma: f64, seed: usi
         real.extend(once.q(visit % poses).iter().zip(missed).map(|(q, missed)| q + missed));
     }
     let commanded = std::mem::replace(&mut data.q, real);
-    data.position = truth.predict(&data);
+    data.points.position = truth.predict(&data);
     data.q = commanded;
-    for (row, point) in data.position.iter_mut().enumerate() {
+    for (row, point) in data.points.position.iter_mut().enumerate() {
         *point += Vector3::from_fn(|axis, _| SIGMA * normal(77_777_777 + seed * 900_001 + 3 * row + axis));
     }
     (data, truth)
@@ -77,7 +76,7 @@ fn joint_repeatability_comes_back_from_returns_and_is_not_seen_where_there_is_no
 #[test]
 fn two_exchanged_returns_do_not_spoil_the_repeatability() {
     let (mut data, _) = visited(60, 4, 1, 5.0 * ARCSEC, 3);
-    data.position.swap(60, 61);
+    data.points.position.swap(60, 61);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let found = Poses::of(&data, &rows).joint_repeatability(&start(&data, &["base_frame"]), &data).expect("it is there");
     assert!((found / (5.0 * ARCSEC) - 1.0).abs() < 0.12, "{:.2} arcsec", found / ARCSEC);

@@ -4,7 +4,7 @@ use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use rand::rngs::ChaCha8Rng;
@@ -54,13 +54,12 @@ impl Trial {
         let mut data = Measurements {
             joints: robot.joints(),
             q: fixture::poses(&description, rows),
-            position: vec![Vector3::zeros(); rows],
-            sigma: vec![Vector3::repeat(SIGMA); rows],
+            points: PointReadings::new(vec![Vector3::zeros(); rows], SIGMA),
             payload: vec![0.0; rows],
             ..Measurements::default()
         };
-        data.position = truth.predict(&data);
-        for point in &mut data.position {
+        data.points.position = truth.predict(&data);
+        for point in &mut data.points.position {
             *point += Vector3::from_fn(|_, _| SIGMA * noise(&mut dice));
         }
         Self { description, data, truth, dice }
@@ -122,7 +121,7 @@ fn outliers(trial: &mut Trial, share: f64) -> Spoilt {
     let mut plain = Spoilt::new();
     for &row in &rows {
         let size = 0.3e-3 * (500.0f64 / 0.3).powf(trial.dice.random::<f64>());
-        trial.data.position[row] += size * direction(&mut trial.dice);
+        trial.data.points.position[row] += size * direction(&mut trial.dice);
         // Held-out rows without a repeat are set aside only where no arm can be so far off.
         if row % 4 != 3 || size > 20e-3 {
             plain.insert(row, "outlier");
@@ -134,7 +133,7 @@ fn outliers(trial: &mut Trial, share: f64) -> Spoilt {
 fn exchanges(trial: &mut Trial, pairs: usize) -> Spoilt {
     let rows = trial.draw(2 * pairs);
     for pair in rows.chunks(2) {
-        trial.data.position.swap(pair[0], pair[1]);
+        trial.data.points.position.swap(pair[0], pair[1]);
     }
     rows.into_iter().map(|row| (row, "exchanged")).collect()
 }
@@ -142,7 +141,7 @@ fn exchanges(trial: &mut Trial, pairs: usize) -> Spoilt {
 fn zeros(trial: &mut Trial) -> Spoilt {
     let rows = trial.draw(5);
     for &row in &rows {
-        trial.data.position[row] = Vector3::zeros();
+        trial.data.points.position[row] = Vector3::zeros();
     }
     rows.into_iter().map(|row| (row, "zero")).collect()
 }
@@ -150,7 +149,7 @@ fn zeros(trial: &mut Trial) -> Spoilt {
 fn slips(trial: &mut Trial) -> Spoilt {
     let rows = trial.draw(4);
     for (&row, factor) in rows.iter().zip([1000.0, 1e-3, 25.4, 1.0 / 25.4]) {
-        trial.data.position[row] *= factor;
+        trial.data.points.position[row] *= factor;
     }
     rows.into_iter().map(|row| (row, "unit_slip")).collect()
 }
@@ -159,7 +158,7 @@ fn slips(trial: &mut Trial) -> Spoilt {
 fn slipped_block(trial: &mut Trial) -> Spoilt {
     let first = trial.dice.random_range(0..trial.rows() - 30);
     for row in first..first + 30 {
-        trial.data.position[row] *= 1e-3;
+        trial.data.points.position[row] *= 1e-3;
     }
     (first..first + 30).map(|row| (row, "unit_slip")).collect()
 }
@@ -167,15 +166,15 @@ fn slipped_block(trial: &mut Trial) -> Spoilt {
 /// Points of twenty rows moved up by one; the last takes the first's.
 fn shifted_block(trial: &mut Trial) -> Spoilt {
     let first = trial.dice.random_range(0..trial.rows() - 20);
-    trial.data.position[first..first + 20].rotate_left(1);
+    trial.data.points.position[first..first + 20].rotate_left(1);
     (first..first + 20).map(|row| (row, "shifted_block")).collect()
 }
 
 /// Three points that changed names in a circle.
 fn circle(trial: &mut Trial) -> Spoilt {
     let rows = trial.draw(3);
-    trial.data.position.swap(rows[0], rows[1]);
-    trial.data.position.swap(rows[1], rows[2]);
+    trial.data.points.position.swap(rows[0], rows[1]);
+    trial.data.points.position.swap(rows[1], rows[2]);
     rows.into_iter().map(|row| (row, "mislabelled")).collect()
 }
 
@@ -281,18 +280,18 @@ fn a_held_out_row_is_set_aside_only_by_evidence_beside_the_model() {
     let trial = || Trial::new(fixture::all().remove(0), 160, 4411, normal);
     let aside = |trial: &Trial| trial.screen().1.suspects.iter().map(|suspect| suspect.row).collect::<Vec<_>>();
     let mut held_out = trial();
-    held_out.data.position[43] += off;
+    held_out.data.points.position[43] += off;
     assert_eq!(aside(&held_out), Vec::<usize>::new(), "3 mm off where the model is the only witness");
     assert_eq!(held_out.screen().1.crowd, 1);
     let mut fitted = trial();
-    fitted.data.position[42] += off;
+    fitted.data.points.position[42] += off;
     assert_eq!(aside(&fitted), [42]);
     // The same pose again, measured where the model predicts it.
     let mut again = trial();
     let joints = again.data.joints;
     again.data.q.copy_within(43 * joints..44 * joints, 51 * joints);
-    again.data.position[51] = again.data.position[43] + Vector3::repeat(1e-6);
-    again.data.position[43] += off;
+    again.data.points.position[51] = again.data.points.position[43] + Vector3::repeat(1e-6);
+    again.data.points.position[43] += off;
     assert_eq!(aside(&again), [43]);
 }
 
@@ -348,7 +347,7 @@ fn a_slip_is_told_in_a_robot_that_has_more_errors_than_its_model() {
         // Two waves of a joint that no effect in this model follows, far above the noise.
         for row in 0..trial.rows() {
             let angle = 2.0 * trial.data.q[row * trial.data.joints];
-            trial.data.position[row] += 40.0 * SIGMA * Vector3::new(angle.cos(), angle.sin(), (3.0 * angle).sin());
+            trial.data.points.position[row] += 40.0 * SIGMA * Vector3::new(angle.cos(), angle.sin(), (3.0 * angle).sin());
         }
         slip_log(&mut trial, 1203, 30);
         let screening = trial.screen().1;
@@ -385,8 +384,8 @@ fn rows_beside_a_wrong_one_in_a_dense_grid_are_not_apart() {
             }
             trial.data.q[row * joints] = 0.026 * along as f64 - 0.4;
         }
-        trial.data.position = trial.truth.predict(&trial.data);
-        for point in &mut trial.data.position {
+        trial.data.points.position = trial.truth.predict(&trial.data);
+        for point in &mut trial.data.points.position {
             *point += Vector3::from_fn(|_, _| SIGMA * normal(&mut trial.dice));
         }
         let wrong = [67, 215, 341, 460];

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{Form, Survey, hypotheses};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -26,8 +26,7 @@ fn refinement_never_leaves_the_bounds_of_a_shape() {
     let data = Measurements {
         joints: n,
         q: fixture::poses(robot.description(), ROWS),
-        position: vec![Vector3::zeros(); ROWS],
-        sigma: vec![Vector3::repeat(1e-5); ROWS],
+        points: PointReadings::new(vec![Vector3::zeros(); ROWS], 1e-5),
         payload: vec![0.0; ROWS],
         time: Some((0..ROWS).map(|row| 100.0 + 10.0 * row as f64).collect()),
         ..Measurements::default()

@@ -6,7 +6,7 @@ use calib::effect::{
     Clock, Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place,
     Summary, Survey, hypotheses, people, whole,
 };
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -16,8 +16,7 @@ fn data(robot: &RobotModel) -> Measurements {
     Measurements {
         joints: robot.joints(),
         q: fixture::poses(robot.description(), ROWS),
-        position: vec![Vector3::zeros(); ROWS],
-        sigma: vec![Vector3::repeat(1e-5); ROWS],
+        points: PointReadings::new(vec![Vector3::zeros(); ROWS], 1e-5),
         payload: vec![0.0; ROWS],
         ..Measurements::default()
     }

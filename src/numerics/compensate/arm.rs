@@ -111,8 +111,6 @@ impl IdentifiedArm {
         let data = Measurements {
             joints,
             q: vec![0.0; joints],
-            position: vec![Vector3::zeros()],
-            sigma: vec![Vector3::zeros()],
             payload: vec![0.0],
             time: Some(vec![LONG_AFTER]),
             direction: Some(vec![0.0; joints]),

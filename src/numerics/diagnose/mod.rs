@@ -38,17 +38,19 @@ pub use types::{
 };
 pub use verdict::other_means;
 
+use crate::criteria::judge::RIVALS;
+use crate::criteria::search::{FEWEST, SIGNIFICANT};
 use crate::effect::Form;
-use judge::{ModelComparison, RIVALS, judge};
+use judge::{ModelComparison, judge};
 use locate::locate;
 use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
-use search::{CauseSearch, SIGNIFICANT, SearchOptions};
+use search::{CauseSearch, SearchOptions};
 use verdict::{LastRound, conclude};
 
 /// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
 /// a [`wrong_setup`] before.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
-    if question.fit.len() < too_few::FEWEST {
+    if question.fit.len() < *FEWEST {
         return too_few::not_asked(question);
     }
     let (mut fitter, mut now) = Fitter::start(question);
@@ -86,7 +88,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             history = RoundHistory::default();
             continue;
         }
-        let structureless = outcome == RoundOutcome::Settled && found.last > SIGNIFICANT;
+        let structureless = outcome == RoundOutcome::Settled && found.last > *SIGNIFICANT;
         if let Some(sigma) = structureless.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);
@@ -94,10 +96,10 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         let next = fitter.held_to_a_common_size(next);
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
-        tell(words::of_the_judgement(&next, RIVALS));
+        tell(words::of_the_judgement(&next, *RIVALS));
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
-        let settled = open_world::settle(judged, found.last <= SIGNIFICANT, search.pool, &survey, &fitter, &mut tell);
+        let settled = open_world::settle(judged, found.last <= *SIGNIFICANT, search.pool, &survey, &fitter, &mut tell);
         let (judged, odds) = (settled.judged, settled.odds);
         tell(words::of_the_conclusions(&judged.state));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };

@@ -22,7 +22,7 @@ pub fn against_simulation(
     }
     let point = |row: usize| Vector3::from(simulated[row]);
     let model: Vec<Vector3<f64>> = used.iter().map(|row| point(*row)).collect();
-    let measured: Vec<Vector3<f64>> = used.iter().map(|row| data.position[*row]).collect();
+    let measured: Vec<Vector3<f64>> = used.iter().filter_map(|row| data.point(*row)).collect();
     // Both frames are nearly right, and what they lack is a motion of the base, which is fitted.
     let (base, frame) = (align(robot, data, &used), align_points(&model, &measured));
     let mut out = data.clone();
@@ -32,9 +32,9 @@ pub fn against_simulation(
         if there(&row) {
             let seat = robot.seat(robot.setup().target(data.target(row)));
             let rigid = (robot.last_body(data.q(row)) * *seat).translation;
-            out.position[row] += base.point(&rigid) - frame.point(&point(row));
+            out.points.shift(row, base.point(&rigid) - frame.point(&point(row)));
         } else {
-            out.sigma[row] = Vector3::repeat(f64::INFINITY);
+            out.points.forget(row);
         }
     }
     Some(out)

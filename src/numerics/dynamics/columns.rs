@@ -81,6 +81,24 @@ impl TorqueColumns {
         }
     }
 
+    /// Columns of the listed forms, and of those of a set, that are made of the sign of a velocity, anew.
+    pub fn renew_signs(&mut self, set: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
+        let used = |number: &usize| *number < self.listed || set.contains(number);
+        for number in
+            (0..self.forms.len()).filter(used).filter(|number| self.forms[*number].cause.is_of_sign()).collect::<Vec<_>>()
+        {
+            let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
+            let range = self.of(number);
+            self.columns[range].clone_from_slice(&fresh);
+        }
+    }
+
+    /// Takes a column of no form; its number.
+    pub fn push_bare(&mut self, column: TorqueColumn) -> usize {
+        self.columns.push(column);
+        self.columns.len() - 1
+    }
+
     /// Columns of a form.
     pub fn of(&self, form: usize) -> std::ops::Range<usize> {
         self.first[form]..self.first[form] + self.forms[form].width
@@ -88,7 +106,12 @@ impl TorqueColumns {
 }
 
 /// A form's columns.
-fn columns_of(form: &TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> Vec<TorqueColumn> {
+pub(super) fn columns_of(
+    form: &TorqueForm,
+    scene: &DynamicScene,
+    reduction: &Reduction,
+    regressor: &ReducedRegressor,
+) -> Vec<TorqueColumn> {
     if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
         return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
     }

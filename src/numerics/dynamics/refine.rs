@@ -16,12 +16,17 @@ const BETTER: f64 = 0.05;
 pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize]) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
-        let form = &problem.all.forms[set[place]];
-        for span in form.cause.spans(form) {
-            HALVES.iter().for_each(|half| try_grid(problem, weighted, set, place, span, *half));
-        }
+        refine_one(problem, weighted, set, place);
     }
     before != set
+}
+
+/// Replaces one form of a set.
+pub(super) fn refine_one(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize], place: usize) {
+    let form = &problem.all.forms[set[place]];
+    for span in form.cause.spans(form) {
+        HALVES.iter().for_each(|half| try_grid(problem, weighted, set, place, span, *half));
+    }
 }
 
 /// One grid about the present number.
@@ -55,7 +60,8 @@ fn try_grid(
     let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
     let gain = |number: usize| sweep.gain(number).square;
     let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
-    if gain(best) > gain(set[place]) + BETTER {
+    let asked = if span.usual == Some(now) { BETTER + (weighted.rows as f64).ln() } else { BETTER };
+    if gain(best) > gain(set[place]) + asked {
         set[place] = best;
     }
 }

@@ -1,6 +1,7 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
+use crate::criteria::effect::{RARE, WOBBLES};
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
     Variable, names,
@@ -36,7 +37,7 @@ impl Cause for AxisWobble {
                 [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
             })
         });
-        forms.map(|form| Hypothesis::new(form, 12).penalised(4.0).within(LARGEST)).collect()
+        forms.map(|form| Hypothesis::new(form, *WOBBLES).penalised(*RARE).within(LARGEST)).collect()
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

@@ -1,6 +1,7 @@
 //! Causes of error: everything that the project knows of one stands in the file that implements [`Cause`], and every cause in one list.
 
 use super::*;
+use crate::criteria::words::REFINEMENT;
 
 /// What a cause is, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,7 +90,7 @@ pub trait Cause: Sync {
 
     /// The share of the gain of a finding of this name below which `part`, found beside it, is its finer shape.
     fn absorbs_below(&self, own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (own.place == part.place && self.absorbs_residual().contains(&part.name)).then_some(FINER_SHAPE)
+        (own.place == part.place && self.absorbs_residual().contains(&part.name)).then_some(*REFINEMENT)
     }
 
     /// Whether `part` is a part of the finding `own`, which has this cause's name or a form of it, whatever it gains.
@@ -197,8 +198,8 @@ pub const CAUSES: &[&dyn Cause] = &[
     &tracker_offset::TrackerOffset,
     &tracker_refraction::TrackerRefraction,
     &joint_log_lag::JointLogLag,
-    &wrong_point::Outlier,
-    &wrong_point::MislabelledPoint,
+    &wrong_point::OUTLIER,
+    &wrong_point::MISLABELLED_POINT,
     &unknown::Unknown,
 ];
 

@@ -7,6 +7,7 @@ use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
     Variable, names, orders,
 };
+use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -17,8 +18,6 @@ pub struct GearCyclic;
 const ORDERS: u32 = 48;
 /// Eccentricity makes the lowest orders on any joint; they are tried as a few, all others as many.
 const LOW: u32 = 4;
-/// A wheel far off its centre is rarer than one slightly off: -2 ln of the odds.
-const OVERTONE: f64 = 2.0;
 
 impl GearCyclic {
     /// The error of one order per turn of a joint; with its overtone, twice the order, as an eccentric wheel or disc has it.
@@ -43,8 +42,10 @@ impl Cause for GearCyclic {
         let joints = survey.revolute();
         let forms = joints.flat_map(|joint| {
             orders::within_travel(survey, joint, ORDERS).flat_map(move |order| {
-                let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
-                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).penalised(OVERTONE));
+                let pure =
+                    Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { *LOW_ORDERS });
+                let wheel =
+                    (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), *LOW_ORDERS).penalised(*UNCOMMON));
                 [Some(pure), wheel].into_iter().flatten().map(|hypothesis| hypothesis.within(orders::BEYOND))
             })
         });

@@ -1,5 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
+use crate::criteria::effect::RARE;
 use super::{
     Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
 };
@@ -10,8 +11,6 @@ pub struct GearLoad;
 
 /// Orders per joint turn that are tried.
 const ORDERS: u32 = 24;
-/// -2 ln of the odds that a gear errs with its load alone.
-const RARER: f64 = 4.0;
 
 impl GearLoad {
     fn term(joint: usize, order: u32) -> Term {
@@ -36,7 +35,7 @@ impl Cause for GearLoad {
         let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
         let terms = joints.flat_map(|joint| {
             let orders = orders::within_travel(survey, joint, ORDERS);
-            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(RARER))
+            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(*RARE))
         });
         terms.collect()
     }

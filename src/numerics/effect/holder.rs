@@ -3,11 +3,9 @@
 //! One target on the last body cannot separate a step of the last joint's zero from a displacement of the target about that axis.
 
 use super::{Basis, Clock, FittedForms, Form, ModelledFinding, NamedForms, Place, Survey, Variable, figure, names};
+use crate::criteria::words::CONSTANT;
 use crate::robot::Travel;
 use nalgebra::Vector3;
-
-/// The radius, and the place along the axis, may change by this share of the displacement.
-const CONSTANT: f64 = 0.1;
 
 /// Whether a form is a step of the last joint's zero, or of the target on the tool; when.
 fn stepped(form: &Form, joints: usize) -> Option<f64> {
@@ -43,7 +41,7 @@ pub(super) fn turned(fitted: &FittedForms) -> Option<ModelledFinding> {
     let axis = robot.axis(joints - 1);
     let [along, radius] = [(to - from).dot(axis), axis.cross(&to).norm() - axis.cross(&from).norm()];
     let moved = (to - from).norm();
-    if along.abs().max(radius.abs()) >= CONSTANT * moved {
+    if along.abs().max(radius.abs()) >= *CONSTANT * moved {
         return None;
     }
     let angle = axis.dot(&from.cross(&to)).atan2(axis.cross(&from).dot(&axis.cross(&to)));

@@ -6,6 +6,7 @@ use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, NamedForms, ParameterSpec, Place, Placed,
     Summary, Survey, Variable, figure, names,
 };
+use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -74,9 +75,9 @@ impl Cause for JointHardening {
             let laws =
                 laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).penalised(4.0)));
+            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
             let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
-            out.push(Hypothesis::new(curve, 1).penalised(4.0));
+            out.push(Hypothesis::new(curve, 1).penalised(*RARE));
         }
         out
     }

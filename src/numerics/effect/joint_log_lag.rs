@@ -6,6 +6,7 @@ use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, HiddenSize, Hypothesis, NamedForms, ParameterSpec, Place,
     Placed, Summary, Survey, Variable, figure, names,
 };
+use crate::criteria::words::{CLOCKS, TRACE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -36,11 +37,6 @@ pub struct Lag {
 
 /// s: clocks farther apart belong to other postures altogether.
 const LARGEST: f64 = 0.3;
-
-/// s: clocks that are apart by less are no cause to measure again.
-const CLOCKS: f64 = 1e-3;
-/// A backlash of less than this share of a lag's gain is a trace of the lag.
-const TRACE: f64 = 0.05;
 
 impl Cause for JointLogLag {
     fn about(&self) -> &'static CauseDescription {
@@ -98,12 +94,12 @@ impl Cause for JointLogLag {
 
     /// A backlash follows the side of the last move, too.
     fn absorbs_below(&self, _own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (part.name == names::BACKLASH).then_some(TRACE)
+        (part.name == names::BACKLASH).then_some(*TRACE)
     }
 
     fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
         let clocks = form.variables() == [Variable::Speed];
-        clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: CLOCKS, unit: Unit::Millisecond })
+        clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
     }
 
     /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.

@@ -4,6 +4,7 @@ use super::{
     Basis, Cause, CauseDescription, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term,
     Variable, names,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use std::f64::consts::PI;
@@ -55,7 +56,7 @@ impl Cause for JointTable {
                 if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
                     let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize, gaps });
                     let term = Term::new(&Self, Motion::Joint { joint }, law);
-                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).penalised(4.0));
+                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).penalised(*RARE));
                 }
             }
         }

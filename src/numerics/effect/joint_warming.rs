@@ -4,6 +4,7 @@ use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
     names, warmth,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
 use crate::units::Unit;
 
@@ -13,8 +14,6 @@ pub struct JointWarming;
 const COOLINGS: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 /// What of a joint follows.
 const KINDS: usize = 3;
-/// -2 ln of the odds that a joint warms visibly and not the links.
-const RARER: f64 = 4.0;
 
 /// Heat of the joint's own work, 1 at its most.
 fn work(joint: usize, survey: &Survey) -> Vec<(Law, usize)> {
@@ -47,7 +46,7 @@ impl Cause for JointWarming {
         for joint in survey.revolute() {
             let mut add = |law, tried: usize| {
                 let term = Term::new(&Self, Motion::Joint { joint }, law);
-                out.push(Hypothesis::new(term, KINDS * tried).penalised(RARER));
+                out.push(Hypothesis::new(term, KINDS * tried).penalised(*RARE));
             };
             for (law, tried) in warmth::all(survey).into_iter().chain(work(joint, survey)) {
                 add(law, tried);

@@ -150,7 +150,7 @@ impl From<Factor> for Law {
 mod tests {
     use super::*;
     use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Measurements, Posture};
+    use crate::robot::{Measurements, PointReadings, Posture};
     use nalgebra::Vector3;
 
     const ROBOT: &str = "calib_robot: 1
@@ -173,8 +173,7 @@ links:
         let data = Measurements {
             joints: 2,
             q: vec![angle; 2],
-            position: vec![Vector3::new(2.0 + payload, 0.0, 0.0)],
-            sigma: vec![Vector3::repeat(1e-5)],
+            points: PointReadings::new(vec![Vector3::new(2.0 + payload, 0.0, 0.0)], 1e-5),
             payload: vec![payload],
             temperature: Some(vec![temperature]),
             time: Some(vec![time]),

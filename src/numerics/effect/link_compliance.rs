@@ -6,6 +6,7 @@ use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
     Variable, names,
 };
+use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -34,11 +35,8 @@ pub struct BentLink {
     bending: Bending,
 }
 
-/// The last links are a stubby wrist, and hardly bend: -2 ln of the odds.
+/// The last links are a stubby wrist, and hardly bend.
 const WRIST: usize = 2;
-const UNLIKELY: f64 = 10.0;
-/// Most of an arm's elasticity is in its gears: -2 ln of the odds that it is a link.
-const RARER: f64 = 4.0;
 
 impl Cause for LinkCompliance {
     fn stands_in_for_two(&self) -> bool {
@@ -63,7 +61,7 @@ impl Cause for LinkCompliance {
         let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
         let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
         let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
-        let odds = |form: &BentLink| if form.link + WRIST >= n { UNLIKELY } else { RARER };
+        let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };
         forms
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))

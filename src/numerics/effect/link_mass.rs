@@ -6,6 +6,7 @@ use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
     Survey, Variable, names,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -40,7 +41,7 @@ impl Cause for LinkMass {
         let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
         let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-        forms.map(|form| Hypothesis::new(form, 2).penalised(4.0)).collect()
+        forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
     }
 
     fn sentence(&self, summary: &Summary) -> String {

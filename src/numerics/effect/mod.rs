@@ -92,7 +92,7 @@ pub use joint_table::JointTable;
 pub use law::{Factor, Law};
 pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
-pub use parts::{FINER_SHAPE, FittedForms, HiddenSize, ModelledFinding, NamedForms};
+pub use parts::{FittedForms, HiddenSize, ModelledFinding, NamedForms};
 pub use place::Place;
 pub use placed_row::{PlacedRow, PlacementBuffers};
 pub use reduction_ratio::ReductionRatio;

@@ -4,9 +4,6 @@ use super::{EffectStack, Form, Place};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
 
-/// Less than this share of a finding's gain at its own joint is its finer shape: the law of the library is never quite the true one.
-pub const FINER_SHAPE: f64 = 0.1;
-
 /// Forms that are called one cause at one place.
 #[derive(Debug, Clone)]
 pub struct NamedForms<'a> {

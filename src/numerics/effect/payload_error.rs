@@ -6,6 +6,7 @@ use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
     Survey, Variable, figure, names,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -44,7 +45,7 @@ impl Cause for PayloadError {
         // Without any mass of the links nothing says how much of a wind-up is the tool's.
         let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
         if yields && weighs {
-            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(4.0));
+            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(*RARE));
         }
         out
     }

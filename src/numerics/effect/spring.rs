@@ -4,6 +4,7 @@
 //! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
 
 use super::form::parameters;
+use crate::criteria::effect::UNCOMMON;
 use super::{
     ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable, names,
 };
@@ -53,7 +54,7 @@ impl Spring {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs =
             joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(2.0)).collect()
+        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(*UNCOMMON)).collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.

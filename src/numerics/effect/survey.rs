@@ -122,7 +122,7 @@ impl<'a> Survey<'a> {
 
     /// Whether an instrument at the recording's origin sees the points from outside: then they are nowhere as far apart as it is away.
     pub fn seen_from_outside(&self) -> bool {
-        let points = || self.rows.iter().filter(|row| self.data.whole(**row)).map(|row| self.data.position[*row]);
+        let points = || self.rows.iter().filter_map(|row| self.data.point(*row));
         let count = points().count();
         let middle = points().sum::<Vector3<f64>>() / count.max(1) as f64;
         count > 0 && points().all(|point| (point - middle).norm() < middle.norm())
@@ -130,7 +130,7 @@ impl<'a> Survey<'a> {
 
     /// Lowest and highest elevation (rad) and range (m) of the points.
     pub fn seen(&self) -> [[f64; 2]; 2] {
-        let points = self.rows.iter().filter(|row| self.data.whole(**row)).map(|row| Sight::of(&self.data.position[*row]));
+        let points = self.rows.iter().filter_map(|row| self.data.point(*row)).map(|point| Sight::of(&point));
         points.fold([[f64::INFINITY, f64::NEG_INFINITY]; 2], |[elevations, ranges], sight| {
             let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
             [wider(elevations, sight.elevation), wider(ranges, sight.range)]

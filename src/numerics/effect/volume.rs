@@ -163,8 +163,6 @@ tool: {point: [20, 10, 60]}
             let data = Measurements {
                 joints: 6,
                 q: vec![0.4, -1.1, 0.9, 0.5, -0.8, 0.3],
-                position: vec![Vector3::zeros()],
-                sigma: vec![Vector3::repeat(f64::INFINITY)],
                 payload: vec![0.0],
                 readings: vec![readings],
                 ..Measurements::default()

@@ -25,7 +25,7 @@ pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     }
     let seat = |row: usize| robot.seat(robot.setup().target(data.target(row)));
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
-    let measured: Vec<Vector3<f64>> = rows.iter().map(|row| data.position[*row]).collect();
+    let measured: Vec<Vector3<f64>> = rows.iter().filter_map(|row| data.point(*row)).collect();
     align_points(&model, &measured)
 }
 

@@ -61,9 +61,9 @@ pub fn gauge(
 
 /// Whole points of a target, zero pose, base frame: their median by axis.
 fn seen_at(robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose, target: &Target) -> Option<Vector3<f64>> {
-    let own = rows.iter().filter(|row| data.whole(**row) && data.target(**row) == target.name);
+    let own = rows.iter().filter(|row| data.target(**row) == target.name);
     let points: Vec<Vector3<f64>> =
-        own.map(|row| (*base * robot.last_body(data.q(*row))).inverse_point(&data.position[*row])).collect();
+        own.filter_map(|row| Some((*base * robot.last_body(data.q(*row))).inverse_point(&data.point(*row)?))).collect();
     let median = |axis: usize| {
         let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
         nearest(&mut values, 0.5)

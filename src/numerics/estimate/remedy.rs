@@ -9,7 +9,7 @@ use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
 use crate::effect::names;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, PointReadings, RobotModel};
 use faer::Mat;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -109,7 +109,7 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
         root = (1.0 + root).powf(1.0 / (joints as f64 + 1.0));
     }
     let ranges: Vec<[f64; 2]> = (0..joints).map(|joint| range(model, data, rows, joint)).collect();
-    let sigma = rows.iter().map(|row| data.sigma[*row]).sum::<Vector3<f64>>() / rows.len() as f64;
+    let sigma = rows.iter().map(|row| data.points.sigma[*row]).sum::<Vector3<f64>>() / rows.len() as f64;
     let mut q = Vec::with_capacity(count * joints);
     for i in 0..count {
         for (joint, [low, high]) in ranges.iter().enumerate() {
@@ -120,8 +120,7 @@ fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -
     Measurements {
         joints,
         q,
-        position: vec![Vector3::zeros(); count],
-        sigma: vec![sigma; count],
+        points: PointReadings { position: vec![Vector3::zeros(); count], sigma: vec![sigma; count] },
         payload: (0..count).map(|i| payloads[i % payloads.len()]).collect(),
         ..Measurements::default()
     }

@@ -117,12 +117,12 @@ const CLEAR: f64 = 5.4;
 fn in_first_pose(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<Vector3<f64>> {
     let exact = |row: &usize| near(data.q(rows[0]), data.q(*row), SAME);
     if rows.iter().all(exact) {
-        return rows.iter().map(|row| data.position[*row]).collect();
+        return rows.iter().filter_map(|row| data.point(*row)).collect();
     }
     let mut scratch = model.stack.scratch(&model.robot);
     let mut predicted = |row: usize| model.place(data, row, &mut scratch).point;
     let first = predicted(rows[0]);
-    rows.iter().map(|row| data.position[*row] - (predicted(*row) - first)).collect()
+    rows.iter().filter_map(|row| Some(data.point(*row)? - (predicted(*row) - first))).collect()
 }
 
 /// The whole points among the rows of a pose, by target.
@@ -159,7 +159,7 @@ impl PoseGroup {
         let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(data, pose)
             .into_iter()
             .map(|rows| {
-                let variance = rows.iter().map(|row| data.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
+                let variance = rows.iter().map(|row| data.points.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
                 let count = rows.len() as f64;
                 let mean = points.by_ref().take(rows.len()).sum::<Vector3<f64>>() / count;
                 (mean, Matrix3::from_diagonal(&(variance / (count * count))))

@@ -33,7 +33,7 @@ pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedR
         };
         first.get_or_insert_with(|| residual.error.norm());
     }
-    RowError { point: data.residual(row, &placed.point), length: length.unwrap_or(0.0), angle }
+    RowError { point: data.points.residual(row, &placed.point), length: length.unwrap_or(0.0), angle }
 }
 
 impl Model {

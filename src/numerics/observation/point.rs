@@ -70,7 +70,7 @@ impl MeasurementKind for PointKind {
 
     fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
         // Each axis has a variance of its own: see `weight`.
-        (data.axes(row) > 0).then(|| (data.residual(row, &placed.point), f64::NAN))
+        (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point), f64::NAN))
     }
 
     fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
@@ -78,7 +78,7 @@ impl MeasurementKind for PointKind {
     }
 
     fn axes(&self, data: &Measurements, row: usize) -> usize {
-        data.axes(row)
+        data.points.axes(row)
     }
 
     fn weight(&self, data: &Measurements, row: usize, _variance: f64, excess: f64) -> Weight {
@@ -86,12 +86,11 @@ impl MeasurementKind for PointKind {
     }
 
     fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
-        (data.axes(row) > 0).then(|| data.noise(row))
+        (data.points.axes(row) > 0).then(|| data.noise(row))
     }
 
     fn lines(&self, data: &Measurements, row: usize) -> &'static [usize] {
-        let measured = |axis: usize| data.sigma[row][axis].is_finite();
-        match [0, 1, 2].map(measured) {
+        match [0, 1, 2].map(|axis| data.points.has(row, axis)) {
             [true, true, true] => &[0, 1, 2],
             [true, true, false] => &[0, 1],
             [true, false, true] => &[0, 2],
@@ -105,11 +104,11 @@ impl MeasurementKind for PointKind {
 
     fn instrument(&self, data: &Measurements, row: usize) -> Option<f64> {
         let finite = |sigma: f64| if sigma.is_finite() { sigma } else { 0.0 };
-        (data.axes(row) > 0).then(|| data.sigma[row].map(finite).norm())
+        (data.points.axes(row) > 0).then(|| data.points.sigma[row].map(finite).norm())
     }
 
     fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
-        error.component_div(&data.sigma[row]).norm_squared()
+        error.component_div(&data.points.sigma[row]).norm_squared()
     }
 
     /// Every recording has its columns.
@@ -118,7 +117,7 @@ impl MeasurementKind for PointKind {
     }
 
     fn words(&self, data: &Measurements, row: usize) -> Vec<&'static str> {
-        let measured = AXES.into_iter().enumerate().filter(|(axis, _)| data.sigma[row][*axis].is_finite());
+        let measured = AXES.into_iter().enumerate().filter(|(axis, _)| data.points.has(row, *axis));
         measured.map(|(_, name)| name).collect()
     }
 }

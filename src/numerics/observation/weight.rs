@@ -22,8 +22,8 @@ impl Weight {
 
     /// Of a row's point with `excess` (m per axis) beside its own noise.
     pub fn of(data: &Measurements, row: usize, excess: f64) -> Self {
-        let variance = data.sigma[row].map(|sigma| sigma * sigma + excess * excess);
-        let measured = |axis: usize| data.sigma[row][axis].is_finite();
+        let variance = data.points.sigma[row].map(|sigma| sigma * sigma + excess * excess);
+        let measured = |axis: usize| data.points.has(row, axis);
         let full = data.spread.as_ref().map(|all| {
             let covariance = all[row] + Matrix3::from_diagonal(&variance);
             if data.whole(row) {

@@ -1,24 +1,21 @@
-//! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
+//! Measurements as the numerics see them: rows with their joints and circumstances, and what was read in them by kind.
 
 use crate::robot::instrument::NoiseBasis;
 use crate::robot::memories::Memories;
+use crate::robot::point::PointReadings;
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::robot::readings::{Named, Reading, Readings};
 use crate::robot::sequence::Sequence;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
-/// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
+/// Measured rows, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
 #[derive(Debug, Clone, Default)]
 pub struct Measurements {
     /// Joints of the arm, the width of per-joint rows.
     pub joints: usize,
     /// rad or m.
     pub q: Vec<f64>,
-    /// Measured point, tracker frame, m; 0 along an axis that was not measured.
-    pub position: Vec<Vector3<f64>>,
-    /// Standard deviation per axis, m; infinite along an axis that was not measured.
-    pub sigma: Vec<Vector3<f64>>,
     /// kg; 0 where nothing was said.
     pub payload: Vec<f64>,
     /// A.
@@ -33,15 +30,17 @@ pub struct Measurements {
     pub direction: Option<Vec<f64>>,
     /// Velocity of each joint when the point was measured, rad/s or m/s; without it the arm stood.
     pub velocity: Option<Vec<f64>>,
-    /// What `sigma` and `spread` rest on.
+    /// What the standard deviations of points and `spread` rest on.
     pub noise_basis: NoiseBasis,
-    /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
+    /// Covariance (m2) of where each row's target is beyond the instrument's, e.g. from the joints' repeatability.
     pub spread: Option<Vec<Matrix3<f64>>>,
     /// By kind beside points and row: variance of each number beyond the instrument's, from the joints' repeatability, in the kind's unit squared.
     pub reading_spread: BTreeMap<&'static str, Vec<f64>>,
     /// The target that each row measured; the tool point where rows name none.
     pub target: Option<Named>,
-    /// What was measured beside points; one entry a kind.
+    /// What was read of points.
+    pub points: PointReadings,
+    /// What was read of other kinds; one entry a kind.
     pub readings: Vec<Readings>,
     /// The order in which the rows were measured, where it is another one than theirs.
     pub sequence: Option<Sequence>,
@@ -50,9 +49,9 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// How many points were measured.
+    /// How many rows were measured, of whatever kinds.
     pub fn rows(&self) -> usize {
-        self.position.len()
+        self.q.len().checked_div(self.joints).unwrap_or(0)
     }
 
     /// Joint positions of a row, rad or m.
@@ -63,18 +62,6 @@ impl Measurements {
     /// Motor currents of a row, A, where recorded.
     pub fn current(&self, row: usize) -> Option<&[f64]> {
         self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
-    }
-
-    /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.
-    pub fn noise(&self, row: usize) -> f64 {
-        if self.whole(row) {
-            let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
-            return (self.sigma[row].norm_squared() + beyond).sqrt();
-        }
-        let measured = (0..3).filter(|axis| self.sigma[row][*axis].is_finite());
-        let beyond = |axis: usize| self.spread.as_ref().map_or(0.0, |all| all[row][(axis, axis)]);
-        let variance: f64 = measured.map(|axis| self.sigma[row][axis].powi(2) + beyond(axis)).sum();
-        variance.sqrt()
     }
 
     /// Whether any row has a time: else [`Measurements::time`] counts rows.
@@ -173,23 +160,19 @@ impl Measurements {
         self.target.as_ref().map_or("", |target| target.name(row))
     }
 
+    /// The point of a row (tracker frame, m) where all of its axes were measured: who needs a point in space asks for it here.
+    pub fn point(&self, row: usize) -> Option<Vector3<f64>> {
+        self.points.whole(row)
+    }
+
     /// Whether all three axes of a row's point were measured.
     pub fn whole(&self, row: usize) -> bool {
-        self.sigma[row].iter().all(|sigma| sigma.is_finite())
+        self.points.whole(row).is_some()
     }
 
-    /// How many axes of a row's point were measured.
-    pub fn axes(&self, row: usize) -> usize {
-        self.sigma[row].iter().filter(|sigma| sigma.is_finite()).count()
-    }
-
-    /// Measured - predicted (m); zero along axes that were not measured.
-    pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
-        let residual = self.position[row] - predicted;
-        if self.whole(row) {
-            return residual;
-        }
-        Vector3::from_fn(|axis, _| if self.sigma[row][axis].is_finite() { residual[axis] } else { 0.0 })
+    /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.
+    pub fn noise(&self, row: usize) -> f64 {
+        self.points.noise(row, self.spread.as_ref().map(|all| &all[row]))
     }
 
     /// What a row measured of a kind beside points, by the kind's name.

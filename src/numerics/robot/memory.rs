@@ -120,8 +120,7 @@ mod tests {
 
     fn recording(q: &[f64], time: &[f64], temperature: &[f64]) -> Measurements {
         let (q, time, temperature) = (q.to_vec(), Some(time.to_vec()), Some(temperature.to_vec()));
-        let position = vec![nalgebra::Vector3::zeros(); q.len()];
-        Measurements { joints: 1, q, time, temperature, position, ..Measurements::default() }
+        Measurements { joints: 1, q, time, temperature, ..Measurements::default() }
     }
 
     #[test]

@@ -19,7 +19,7 @@ struct CarriedErrors {
 
 impl CarriedErrors {
     fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Self {
-        let errors = || rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm() * 1e3);
+        let errors = || rows.iter().map(|row| data.points.residual(*row, &predicted[*row]).norm() * 1e3);
         let count = rows.len().max(1) as f64;
         Self {
             mean: errors().sum::<f64>() / count,

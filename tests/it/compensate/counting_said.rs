@@ -5,7 +5,7 @@ use super::true_error::Cell;
 use super::{ROBOT, calib};
 use calib::poses::{Drive, write};
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::twin::effect::{JointCompliance, Physical};
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn poses_in_the_controllers_counting_keep_the_joints_within_their_limits() {
     let data = Measurements {
         joints: 6,
         q: q.concat(),
-        position: q.iter().map(|q| robot.forward(q).translation).collect(),
+        points: PointReadings::new(q.iter().map(|q| robot.forward(q).translation).collect(), 0.0),
         payload: vec![0.0; 200],
         ..Measurements::default()
     };

@@ -7,7 +7,7 @@ use calib::description::RobotDescription;
 use calib::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib::estimate::gauge;
 use calib::observation::Dimension;
-use calib::robot::{Measurements, Named as Names, NoiseBasis, Readings, RobotModel};
+use calib::robot::{Measurements, Named as Names, NoiseBasis, PointReadings, Readings, RobotModel};
 use calib::twin::effect::{Backlash, GearCyclic, JointCompliance, Physical};
 use calib::twin::given::GivenPose;
 use calib::twin::plan::{Block, Climate, Poses};
@@ -117,8 +117,7 @@ fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeata
         rows: Measurements {
             joints,
             q: own.iter().flat_map(|shot| shot.q.clone()).collect(),
-            position: vec![Vector3::zeros(); rows],
-            sigma: vec![Vector3::repeat(f64::INFINITY); rows],
+            points: PointReadings::none(rows),
             payload: own.iter().map(|shot| shot.payload_kg).collect(),
             time: Some(own.iter().map(|shot| shot.time_s).collect()),
             direction: Some(own.iter().flat_map(|shot| shot.direction.clone()).collect()),
@@ -178,8 +177,9 @@ impl Recorded {
     /// Adds points of every other row, by a coarse tracker.
     fn with_some_points(mut self) -> Self {
         for row in (0..self.point.len()).step_by(2) {
-            self.rows.position[row] = self.point[row] + Vector3::from_fn(|axis, _| SIGMA_POINT * normal(90_000 + 3 * row + axis));
-            self.rows.sigma[row] = Vector3::repeat(SIGMA_POINT);
+            self.rows.points.position[row] =
+                self.point[row] + Vector3::from_fn(|axis, _| SIGMA_POINT * normal(90_000 + 3 * row + axis));
+            self.rows.points.sigma[row] = Vector3::repeat(SIGMA_POINT);
         }
         self
     }

@@ -2,7 +2,7 @@
 
 use super::{simulated, wanted};
 use calib::effect::{Form, Survey};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
@@ -13,8 +13,7 @@ fn recorded(robot: &RobotModel) -> Measurements {
     Measurements {
         joints: robot.joints(),
         q: (0..rows * robot.joints()).map(angle).collect(),
-        position: vec![Vector3::new(1.0, 0.2, 0.7); rows],
-        sigma: vec![Vector3::repeat(2e-5); rows],
+        points: PointReadings::new(vec![Vector3::new(1.0, 0.2, 0.7); rows], 2e-5),
         payload: vec![10.0; rows],
         time: Some((0..rows).map(|row| 1000.0 * row as f64 / (rows - 1) as f64).collect()),
         ..Measurements::default()

@@ -43,7 +43,7 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         let (cell, mut data) = cell(seed);
         let (logged, joints) = (data.q.clone(), data.joints);
         (STEP..ROWS).for_each(|row| data.q[row * joints + joints - 1] += f64::to_radians(degrees));
-        data.position = cell.truth.predict(&data);
+        data.points.position = cell.truth.predict(&data);
         data.q = logged;
         let said = said(&cell, data);
         let statements: Vec<&str> = said.findings.iter().map(|finding| finding.statement.as_str()).collect();
@@ -65,7 +65,7 @@ fn a_target_that_moves_along_the_last_axis_has_not_turned() {
     let robot = RobotModel::new(cell.description.clone());
     for row in STEP..ROWS {
         let turn = cell.truth.stack.base().rotation * robot.last_body(data.q(row)).rotation;
-        data.position[row] += turn * robot.axis(data.joints - 1) * 3e-4;
+        data.points.position[row] += turn * robot.axis(data.joints - 1) * 3e-4;
     }
     let said = said(&cell, data);
     assert_eq!(said.findings.len(), 1, "{}", said.statement);

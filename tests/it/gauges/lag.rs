@@ -24,7 +24,7 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
             (0..joints).for_each(|joint| data.q[row * joints + joint] += rest(moves[joint], largest));
         }
     }
-    data.position = cell.truth.predict(&data);
+    data.points.position = cell.truth.predict(&data);
     data.q = logged;
     // Encoders of a halted arm show other last digits every time.
     data.q.iter_mut().enumerate().for_each(|(k, q)| *q += 2e-6 * normal(7_000_000 + k));

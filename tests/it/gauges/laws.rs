@@ -6,7 +6,7 @@ use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use calib::observation::{KINDS, MeasurementKind, Weight, rank};
-use calib::robot::{Anchor, MeasurementSetup, Measurements, Readings, RobotModel, Target};
+use calib::robot::{Anchor, MeasurementSetup, Measurements, PointReadings, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -43,12 +43,11 @@ impl Truth {
         let mut data = Measurements {
             joints,
             q: fixture::poses(&self.description, poses),
-            position: vec![Vector3::zeros(); poses],
-            sigma: vec![Vector3::repeat(SIGMA); poses],
+            points: PointReadings::new(vec![Vector3::zeros(); poses], SIGMA),
             payload: vec![0.0; poses],
             ..Measurements::default()
         };
-        data.position = self.model.predict(&data);
+        data.points.position = self.model.predict(&data);
         let rotations = self.rotations(&data);
         for kind in read().skip(1) {
             data.readings.push(self.readings(kind.about().name, &data, &rotations));
@@ -74,7 +73,7 @@ impl Truth {
             Model { robot: self.model.robot.clone().measured_by(setup), ..self.model.clone() }.predict(data)
         });
         let rows = 0..data.rows();
-        rows.map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.position[row]) / 0.5)))
+        rows.map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.points.position[row]) / 0.5)))
             .collect()
     }
 
@@ -86,8 +85,8 @@ impl Truth {
         let row: &dyn Fn(usize) -> Vec<f64> = match kind {
             "orientation" => &|row| rotations[row].iter().copied().collect(),
             "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
-            "planar" => &|row| [1, 2].map(|axis: usize| -data.position[row][axis] / data.position[row].x).to_vec(),
-            "distance" => &|row| vec![(data.position[row] - anchor).norm()],
+            "planar" => &|row| [1, 2].map(|axis: usize| -data.points.position[row][axis] / data.points.position[row].x).to_vec(),
+            "distance" => &|row| vec![(data.points.position[row] - anchor).norm()],
             other => panic!("say what `{other}` measures"),
         };
         let values: Vec<f64> = (0..data.rows()).flat_map(row).collect();
@@ -106,8 +105,7 @@ pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
     Measurements {
         joints: data.joints,
         q: rows.iter().flat_map(|row| data.q(*row).to_vec()).collect(),
-        position: rows.iter().map(|row| data.position[*row]).collect(),
-        sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
+        points: data.points.subset(rows),
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
         readings: data.readings.iter().map(taken).collect(),
         ..Measurements::default()
@@ -165,8 +163,8 @@ fn alone(data: &Measurements, kind: &dyn MeasurementKind) -> Measurements {
     let mut own = data.clone();
     own.readings.retain(|readings| readings.kind == name);
     if name != KINDS[0].about().name {
-        own.position.fill(Vector3::zeros());
-        own.sigma.fill(Vector3::repeat(f64::INFINITY));
+        own.points.position.fill(Vector3::zeros());
+        own.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     }
     own
 }

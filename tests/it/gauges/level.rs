@@ -31,7 +31,7 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
         let noise = |k: usize| normal(1_000_003 * (seed + 1) + 8 * row + k);
         let tilt = data.reading("inclination", row).expect("measured").values;
         let cells = data.q(row).iter().map(|q| q.to_degrees());
-        let cells = cells.chain((0..3).map(|axis| (data.position[row][axis] + SIGMA * noise(axis)) * 1e3));
+        let cells = cells.chain((0..3).map(|axis| (data.points.position[row][axis] + SIGMA * noise(axis)) * 1e3));
         let cells = cells.chain((0..2).map(|axis| (tilt[axis] + SIGMA_TILT * noise(3 + axis)) * 1e3));
         text.push_str(&cells.map(|cell| format!("{cell:.9}")).collect::<Vec<_>>().join(","));
         text.push('\n');
@@ -52,7 +52,7 @@ fn ingested(data: &Measurements, seed: usize) -> Recording {
 /// Rms of what is stated and of what is so of predictions at rows `at`, m.
 fn errors(model: &Model, fitted: &Fitted, at: &Measurements) -> [f64; 2] {
     let rms = |values: Vec<f64>| (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
-    let off = model.predict(at).iter().zip(&at.position).map(|(a, b)| (a - b).norm()).collect();
+    let off = model.predict(at).iter().zip(&at.points.position).map(|(a, b)| (a - b).norm()).collect();
     [rms(fitted.covariance.as_ref().expect("not singular").of_predictions(model, at)), rms(off)]
 }
 
@@ -90,8 +90,8 @@ fn a_level_alone_finds_the_offsets_of_joints_that_tilt_it() {
     let all = truth.rows(200);
     let recording = ingested(&select(&all, &upright(&all)), 1);
     let mut data = recording.measurements();
-    data.position.fill(Vector3::zeros());
-    data.sigma.fill(Vector3::repeat(f64::INFINITY));
+    data.points.position.fill(Vector3::zeros());
+    data.points.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = truth.fit(&data, |name| is_offset(name) || name.starts_with("tool_offset.r"));
     let free = model.stack.specs().iter().zip(&model.x).zip(&fitted.statuses).filter_map(|((spec, value), fate)| match fate {
         ParameterStatus::Free(sigma) if is_offset(&spec.name) => Some((spec.name.as_str(), *value, *sigma)),

@@ -25,7 +25,7 @@ fn stops(poses: usize, visits: usize, joint_sigma: f64, jitter: f64) -> (Cell, M
     for (k, q) in data.q.iter_mut().enumerate() {
         *q += joint_sigma * normal(5_000_000 + k / (3 * joints) * joints + k % joints);
     }
-    data.position = cell.truth.predict(&data);
+    data.points.position = cell.truth.predict(&data);
     data.q = commanded;
     for (k, q) in data.q.iter_mut().enumerate() {
         *q += jitter * normal(9_000_000 + k);
@@ -122,7 +122,7 @@ fn a_pose_with_wrong_joints_is_set_aside_with_all_its_targets_and_no_event() {
     }
     // Something that lasts for four poses is an event.
     for row in 3 * 40..3 * 44 {
-        data.position[row] += Vector3::new(0.0, 3e-4, 1e-4);
+        data.points.position[row] += Vector3::new(0.0, 3e-4, 1e-4);
     }
     let all = rows(&data);
     let (robot, base) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
@@ -154,7 +154,7 @@ fn near_repeats_count_less_the_known_motion() {
         for (k, q) in data.q.iter_mut().enumerate() {
             *q += joint_sigma * normal(4_000_000 + k);
         }
-        data.position = cell.truth.predict(&data);
+        data.points.position = cell.truth.predict(&data);
         data.q = logged;
         cell.disturb(&mut data);
         data

@@ -15,7 +15,9 @@ use std::collections::BTreeMap;
 /// The cell as tables: the robot, a recording of it, and rows that are all to be fitted.
 fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
     let rows = data.rows();
-    let measured = |row: usize| [0, 1, 2].map(|k| if data.sigma[row][k].is_finite() { data.position[row][k] } else { f64::NAN });
+    let measured = |row: usize| {
+        [0, 1, 2].map(|k| if data.points.sigma[row][k].is_finite() { data.points.position[row][k] } else { f64::NAN })
+    };
     let vector = |rotation: &[f64]| -> [f64; 3] {
         Pose::new(Matrix3::from_column_slice(rotation), Vector3::zeros()).rotation_vector().into()
     };
@@ -60,8 +62,8 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     cell.turn(&mut data);
     cell.reach(&mut data, &[("N", Vector3::new(4.0, 1.0, 0.3)), ("S", Vector3::new(1.0, -3.0, 0.2))], 3e-5);
     for row in 90..120 {
-        data.sigma[row] = Vector3::repeat(f64::INFINITY);
-        data.position[row] = Vector3::zeros();
+        data.points.sigma[row] = Vector3::repeat(f64::INFINITY);
+        data.points.position[row] = Vector3::zeros();
     }
     let reads = tables(&cell, &data);
     let (description, recording) = (cell.description.clone(), reads.recording.clone());

@@ -25,7 +25,7 @@ fn targets_and_gaps_arrive_by_row() {
     let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
     assert_eq!(taken.recording.target, Some(vec![Some("A".into()), Some("B".into()), None]));
     assert_eq!(taken.recording.position[1][2], 0.035);
-    assert!(taken.recording.position[1][0].is_nan() && !taken.recording.is_whole(1) && taken.recording.is_whole(2));
+    assert!(taken.recording.position[1][0].is_nan() && taken.recording.point(1).is_none() && taken.recording.point(2).is_some());
     assert_eq!(taken.rejected.0[0].detail, "nothing was measured in this row");
 }
 

@@ -82,7 +82,7 @@ fn recorded_standard_deviations_replace_the_instrument_row_by_row() {
     let sources = [SigmaSource::Recorded, SigmaSource::Instrument, SigmaSource::Instrument];
     assert_eq!(recording.sigma_source.as_deref(), Some(&sources[..]));
     let data = recording.measurements();
-    assert!((data.sigma[0].z - 80e-6).abs() < 1e-12, "{}", data.sigma[0]);
+    assert!((data.points.sigma[0].z - 80e-6).abs() < 1e-12, "{}", data.points.sigma[0]);
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn a_coordinate_of_exactly_zero_keeps_its_stated_uncertainty() {
         assert_eq!(recording.sigma_source.as_deref(), Some(&[SigmaSource::Recorded; 3][..]));
         let data = recording.measurements();
         assert_eq!(data.noise_basis, NoiseBasis::Instrument);
-        let own: Vec<[f64; 3]> = data.sigma.iter().map(|sigma| (sigma * 1e6).into()).collect();
+        let own: Vec<[f64; 3]> = data.points.sigma.iter().map(|sigma| (sigma * 1e6).into()).collect();
         is_near(&own, &expected);
     }
 }

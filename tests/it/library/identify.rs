@@ -1,7 +1,7 @@
 use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit, gauge};
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -20,8 +20,7 @@ pub fn identify(robot_file: &str, q: &[Vec<f64>], points: &[[f64; 3]]) -> Result
     let data = Measurements {
         joints: robot.joints(),
         q: q.concat(),
-        position: points.iter().map(|point| Vector3::from(*point)).collect(),
-        sigma: vec![Vector3::repeat(10e-6); points.len()], // 10 um on every axis
+        points: PointReadings::new(points.iter().map(|point| Vector3::from(*point)).collect(), 10e-6), // 10 um on every axis
         payload: vec![0.0; points.len()],
         ..Measurements::default()
     };

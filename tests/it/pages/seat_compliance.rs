@@ -43,7 +43,7 @@ mod tests {
     use crate::fixture;
     use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, whole};
     use calib::estimate::{FitOptions, Model, fit};
-    use calib::robot::Measurements;
+    use calib::robot::{Measurements, PointReadings};
     use calib::spatial::{Pose, Twist};
     use nalgebra::Vector3;
 
@@ -57,8 +57,7 @@ mod tests {
         let mut data = Measurements {
             joints: robot.joints(),
             q: fixture::poses(robot.description(), rows.len()),
-            position: vec![Vector3::zeros(); rows.len()],
-            sigma: vec![Vector3::repeat(1e-5); rows.len()],
+            points: PointReadings::new(vec![Vector3::zeros(); rows.len()], 1e-5),
             payload: rows.iter().map(|row| [0.0, 100.0, 210.0][row % 3]).collect(),
             ..Measurements::default()
         };
@@ -75,7 +74,7 @@ mod tests {
         let mut truth = start.clone();
         let first = truth.x.len() - 3;
         truth.x[first..].copy_from_slice(&TRUE);
-        data.position = truth.predict(&data);
+        data.points.position = truth.predict(&data);
         let candidates: Vec<usize> = (0..start.x.len()).collect();
         let (fitted, _) = fit(&start, &data, &FitOptions { rows: &rows, candidates: &candidates });
         for (found, truth) in fitted.x[first..].iter().zip(TRUE) {

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{CAUSES, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, whole};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -26,9 +26,8 @@ fn recorded(robot: &RobotModel) -> Measurements {
     let q = fixture::poses(robot.description(), ROWS);
     Measurements {
         joints: n,
-        position: q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(),
+        points: PointReadings::new(q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(), 1e-5),
         q,
-        sigma: vec![Vector3::repeat(1e-5); ROWS],
         payload: (0..ROWS).map(|row| [0.0, 10.0][row % 2]).collect(),
         current: Some(spread(3).map(|value| 5.0 * value).collect()),
         direction: Some(spread(5).map(f64::signum).collect()),
@@ -51,9 +50,8 @@ fn sweep(robot: &RobotModel, joint: usize) -> Measurements {
     let own = |each: &dyn Fn(usize) -> f64| (0..SWEEP * n).map(|k| if k % n == joint { each(k / n) } else { 0.0 }).collect();
     Measurements {
         joints: n,
-        position: q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(),
+        points: PointReadings::new(q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(), 1e-5),
         q,
-        sigma: vec![Vector3::repeat(1e-5); SWEEP],
         payload: vec![10.0; SWEEP],
         current: Some(vec![1.0; SWEEP * n]),
         direction: Some(own(&|row| if 2 * row < SWEEP { 1.0 } else { -1.0 })),

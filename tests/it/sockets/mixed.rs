@@ -4,7 +4,7 @@ use super::{calibrated, fixture, free, socket, touched, truth};
 use crate::identify::normal;
 use calib::estimate::scale;
 use calib::observation::{only_brought, rank};
-use calib::robot::{Measurements, Named, Readings};
+use calib::robot::{Measurements, Named, PointReadings, Readings};
 use calib::twin::arm::Arm;
 use calib::twin::motion::Motion;
 use nalgebra::Vector3;
@@ -27,8 +27,10 @@ fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
     Measurements {
         joints: points.joints,
         q: [points.q, sockets.q.clone()].concat(),
-        position: [points.position, sockets.position.clone()].concat(),
-        sigma: [points.sigma, sockets.sigma.clone()].concat(),
+        points: PointReadings {
+            position: [points.points.position, sockets.points.position.clone()].concat(),
+            sigma: [points.points.sigma, sockets.points.sigma.clone()].concat(),
+        },
         payload: vec![0.0; rows + more],
         readings: vec![readings],
         ..Measurements::default()
@@ -46,14 +48,14 @@ fn points_of_a_tracker_tell_the_scale_of_sockets() {
         let there = |data: &Measurements, row: usize| {
             Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool)
         };
-        points.position = (0..points.rows())
+        points.points.position = (0..points.rows())
             .map(|row| {
                 there(&points, row)
                     + Vector3::new(1.0, -2.0, 0.5)
                     + Vector3::from([0, 1, 2].map(|axis| SIGMA * normal(7 * row + axis)))
             })
             .collect();
-        points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
+        points.points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
         let data = beside(points, &touched(&robot, &truth, &cell, 21).measurements());
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (model, fitted) = calibrated(&robot, &data, &[], &[]);

@@ -6,7 +6,7 @@ use crate::desk;
 use calib::description::RobotDescription;
 use calib::estimate::{Model, scale};
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::robot::{Measurements, Readings};
+use calib::robot::{Measurements, PointReadings, Readings};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -42,8 +42,7 @@ fn recording(folder: &str, without: &[&str]) -> Option<(Measurements, Vec<usize>
     let data = Measurements {
         joints: 7,
         q,
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(f64::INFINITY); rows],
+        points: PointReadings::none(rows),
         payload: vec![0.0; rows],
         readings: vec![Readings { kind: "socket", width: 0, values: Vec::new(), sigma: vec![1e-4; rows], anchor }],
         ..Measurements::default()

@@ -3,12 +3,11 @@
 use super::alternatives::Alternatives;
 use super::comparison::{ModelComparison, others};
 use super::fold_errors::{FoldErrors, FoldGain};
-use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
+use crate::criteria::judge::RIVALS;
+use crate::criteria::search::EQUIVALENT;
+use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
 use crate::effect::{Effect, Place, follows, names};
-
-/// Rivals that are tried in place of a cause.
-pub(crate) const RIVALS: usize = 4;
 
 /// Exchanges or drops causes that make the folds worse; `set` holds the causes' positions in the pool, in their order.
 pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &ModelComparison) -> (FitState, Vec<FoldGain>) {
@@ -126,7 +125,7 @@ impl Contested {
             set.push(*h);
             set.sort_unstable();
             let prior_penalty = pool.prior_penalty[*h];
-            if tried.contains(&&pool.keys[*h]) || pool.bic(&set) - prior_penalty - self.fit > EQUIVALENT {
+            if tried.contains(&&pool.keys[*h]) || pool.bic(&set) - prior_penalty - self.fit > *EQUIVALENT {
                 continue;
             }
             tried.push(&pool.keys[*h]);
@@ -134,7 +133,7 @@ impl Contested {
             let form = pool.hypotheses[*h].form.clone();
             let cause = EstimatedCause::shrunk(form, pool.problem.robot, coefficients.unwrap_or_default());
             rivals.push(RivalOf { at: *h, cause, prior_penalty });
-            if rivals.len() == RIVALS {
+            if rivals.len() == *RIVALS {
                 break;
             }
         }

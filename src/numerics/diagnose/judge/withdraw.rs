@@ -133,7 +133,7 @@ mod tests {
     use crate::effect::{EffectStack, Form, GearCyclic, Survey, hypotheses};
     use crate::estimate::Model;
     use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Measurements, RobotModel};
+    use crate::robot::{Measurements, PointReadings, RobotModel};
     use crate::spatial::Pose;
     use nalgebra::Vector3;
 
@@ -168,8 +168,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         let mut data = Measurements {
             joints: 6,
             q: (0..6 * ROWS).map(|k| 3.0 * scattered(k + 7) - 1.5).collect(),
-            position: vec![Vector3::zeros(); ROWS],
-            sigma: vec![Vector3::repeat(2e-5); ROWS],
+            points: PointReadings::new(vec![Vector3::zeros(); ROWS], 2e-5),
             payload: (0..ROWS).map(|row| if row % 7 < 3 { 10.0 } else { 0.0 }).collect(),
             ..Measurements::default()
         };
@@ -179,7 +178,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         };
         let (seen, held) = (predicted([60.0, 0.0, passing, 0.0], &mut truth), predicted([60.0, 0.0, 0.0, 0.0], &mut truth));
         let noise = |row: usize| Vector3::from_fn(|axis, _| 7e-5 * (scattered(3 * row + axis + 5000) - 0.5));
-        data.position = (0..ROWS).map(|row| if row < FITTED { seen[row] } else { held[row] } + noise(row)).collect();
+        data.points.position = (0..ROWS).map(|row| if row < FITTED { seen[row] } else { held[row] } + noise(row)).collect();
         data
     }
 

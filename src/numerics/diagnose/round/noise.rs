@@ -1,5 +1,6 @@
 //! How well the joints repeat: one standard deviation for all, by maximum likelihood on repeats or on a residual without structure.
 
+use crate::criteria::noise::{CAP, FEW, REPEATS};
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model, Poses};
@@ -7,16 +8,10 @@ use crate::observation::{MeasurementKind, PointKind, Residual, kinds, values};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
-/// Repeats that make the noise known; with fewer it is taken from a residual without structure.
-pub(crate) const REPEATS: usize = 10;
-/// Fewer repeats than this say too little.
-const FEW: usize = 4;
 /// Standard deviations tried, rad.
 const LOWEST: f64 = 5e-7;
 const HIGHEST: f64 = 3e-4;
 const STEPS: usize = 60;
-/// A squared whitened error counts at most this much.
-const CAP: f64 = 30.0;
 
 /// Covariances per squared deviation of every joint, by row.
 #[derive(Default)]
@@ -120,12 +115,12 @@ impl RepeatPairs {
             between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
         };
         let (mut pairs, mut returns): (Vec<[usize; 2]>, Vec<[usize; 2]>) = pairs.partition(at_once);
-        if pairs.len() >= REPEATS || returns.is_empty() {
+        if pairs.len() >= *REPEATS || returns.is_empty() {
             pairs.sort_unstable_by_key(|pair| pair[1]);
             return Self { pairs, are_returns: false };
         }
         returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
-        returns.truncate(returns.len().div_ceil(2).max(REPEATS));
+        returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
         pairs.extend(returns);
         pairs.sort_unstable_by_key(|pair| pair[1]);
         Self { pairs, are_returns: true }
@@ -134,18 +129,17 @@ impl RepeatPairs {
     /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
     pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> JointRepeatability {
         let repeats = self.pairs.len();
-        if repeats < FEW {
+        if repeats < *FEW {
             return JointRepeatability { sigma: 0.0, repeats };
         }
         let predicted = model.predict(data);
         let one = |[a, b]: &[usize; 2]| {
-            let variance = |row: usize| Matrix3::from_diagonal(&data.sigma[row].map(|s| s * s));
+            let variance = |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
             let known =
                 if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
-            (data.position[*b] - data.position[*a] - known, variance(*a) + variance(*b), spread.points[*b] * 2.0)
+            Some((data.point(*b)? - data.point(*a)? - known, variance(*a) + variance(*b), spread.points[*b] * 2.0))
         };
-        let whole = |[a, b]: &&[usize; 2]| data.whole(*a) && data.whole(*b);
-        let mut samples: Vec<_> = self.pairs.iter().filter(whole).map(one).collect();
+        let mut samples: Vec<_> = self.pairs.iter().filter_map(one).collect();
         for [a, b] in self.pairs.iter().filter(|[a, b]| data.anchor(*a) == data.anchor(*b)) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
             let both = to.iter().filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
@@ -158,7 +152,7 @@ impl RepeatPairs {
 
 /// The rows of a pose that measured other than whole points of one target, from one anchor, where there are several.
 fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
-    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.axes(*row);
+    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.points.axes(*row);
     let same = |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
     let mut out: Vec<Vec<usize>> = Vec::new();
     for pose in poses.all() {
@@ -180,10 +174,10 @@ pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: 
     let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
     let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
-        let residual = data.position[*row] - predicted[*row];
-        (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread.points[*row])
+        let residual = data.point(*row)? - predicted[*row];
+        Some((residual * freedom, Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s)), spread.points[*row]))
     };
-    let mut samples: Vec<_> = rows.iter().filter(|row| data.whole(**row)).map(one).collect();
+    let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
     samples.extend(others.map(|left| (left.error * freedom, left.fixed, left.varying)));
     likeliest(&samples, 6.0)
@@ -194,8 +188,8 @@ fn likeliest(samples: &[(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)], evidence: f
     let cost = |sigma: f64| -> f64 {
         let one = |(error, fixed, varying): &(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)| {
             let covariance = fixed + varying * (sigma * sigma);
-            let square = covariance.try_inverse().map_or(CAP, |inverse| error.dot(&(inverse * error)));
-            square.min(CAP) + covariance.determinant().ln()
+            let square = covariance.try_inverse().map_or(*CAP, |inverse| error.dot(&(inverse * error)));
+            square.min(*CAP) + covariance.determinant().ln()
         };
         samples.iter().map(one).sum()
     };

@@ -1,20 +1,15 @@
 //! Choices that a search made early are undone: members are exchanged, left out, and put more simply.
 
 use super::{CauseSearch, best, decisive, with};
-use crate::diagnose::pool::EQUIVALENT;
+use crate::criteria::search::{EQUIVALENT, SINGLE, WIDE};
 use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
-
-/// Sets with more parameters than this are wide.
-const WIDE: usize = 60;
-/// Candidates in place of a single member.
-const SINGLE: usize = 8;
 
 impl CauseSearch<'_, '_> {
     /// Exchanges members, one, two or all of a place at a time, while the criterion falls: greedy choices are undone.
     pub(super) fn exchange(&mut self, mut set: Vec<usize>) -> Vec<usize> {
         // Free curves have dozens of parameters: with several of them a second look costs minutes and changes little.
-        let looks = if self.pool.columns_of(&set).len() > WIDE { 1 } else { 4 };
+        let looks = if self.pool.columns_of(&set).len() > *WIDE { 1 } else { 4 };
         for _ in 0..looks {
             let mut others: BTreeSet<Vec<usize>> = BTreeSet::new();
             let mut gone: BTreeSet<Vec<usize>> = BTreeSet::new();
@@ -30,7 +25,7 @@ impl CauseSearch<'_, '_> {
             for gone in gone {
                 let rest: Vec<usize> = set.iter().copied().filter(|k| !gone.contains(k)).collect();
                 let given = self.pool.given(&rest);
-                let many = if gone.len() == 1 { SINGLE } else { 3 + gone.len() };
+                let many = if gone.len() == 1 { *SINGLE } else { 3 + gone.len() };
                 let candidates = best(self.pool, &given, many).into_iter().filter(|h| !gone.contains(h));
                 let candidates: Vec<Vec<usize>> = candidates.map(|h| with(&rest, h)).collect();
                 // One may stand in for two.
@@ -87,7 +82,7 @@ impl CauseSearch<'_, '_> {
             };
             let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
             let other = with(&rest, simple);
-            if self.pool.bic(&other) < self.pool.bic(&set) + EQUIVALENT {
+            if self.pool.bic(&other) < self.pool.bic(&set) + *EQUIVALENT {
                 set = other;
             }
         }

@@ -1,12 +1,10 @@
 //! Commanded joints beside measured points, as the files say or as they would be with a set-up error mended.
 
+use crate::criteria::setup::MOST;
 use crate::robot::{Measurements, RobotModel, Travel};
 use crate::spatial::Pose;
 use crate::statistics::nearest;
 use nalgebra::Vector3;
-
-/// More rows say no more of errors of this size.
-const MOST: usize = 240;
 
 /// Rows of joints and points.
 #[derive(Clone)]
@@ -23,16 +21,17 @@ pub(super) struct PointPairs<'a> {
 
 /// Some of the rows, evenly over all of them.
 pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
-    rows.iter().copied().step_by(rows.len().div_ceil(MOST).max(1)).collect()
+    rows.iter().copied().step_by(rows.len().div_ceil(*MOST).max(1)).collect()
 }
 
 impl<'a> PointPairs<'a> {
-    /// Joints of rows, each beside the point of a row.
+    /// Joints of rows, each beside the point of a row that has a whole one.
     pub fn of(robot: &'a RobotModel, data: &Measurements, rows: impl Iterator<Item = (usize, usize)>) -> Self {
         let (mut q, mut points, mut target) = (Vec::new(), Vec::new(), Vec::new());
         for (joints, point) in rows {
+            let Some(place) = data.point(point) else { continue };
             q.extend_from_slice(data.q(joints));
-            points.push(data.position[point]);
+            points.push(place);
             target.push(robot.setup().target(data.target(point)).unwrap_or(0));
         }
         Self { robot, q, points, target, targets: robot.setup().targets.len().max(1) }

@@ -3,8 +3,9 @@
 use super::faults::{faults, rows_apart};
 use super::last_round::LastRound;
 use super::probability::{weigh, weigh_fault};
-use super::rivals::{FIRM, exact, rivals};
+use super::rivals::{exact, rivals};
 use crate::diagnose::finding_groups::{FindingKey, groups};
+use crate::criteria::words::{ASTRAY, FIRM, REFINEMENT, REJECTED};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
@@ -12,7 +13,7 @@ use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::diagnose::words::{left_out, none_of_the_list, not_so, sentence, small, told};
 use crate::effect::{
-    Basis, Clock, Effect, FINER_SHAPE, FittedForms, Form, Hypothesis, ModelledFinding, ParameterEstimate, Place, Summary,
+    Basis, Clock, Effect, FittedForms, Form, Hypothesis, ModelledFinding, ParameterEstimate, Place, Summary,
     Variable, follows, names, people,
 };
 use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
@@ -56,9 +57,6 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     out
 }
 
-/// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little it is confirmed.
-const REJECTED: f64 = 0.95;
-
 /// What has a rejected name is unknown, and the name becomes a rival; the size of what has no law is told by the evidence of its free form.
 fn unnamed(finding: &mut Finding, odds: &NameOdds) {
     let has_no_law = finding.has_no_law();
@@ -66,7 +64,7 @@ fn unnamed(finding: &mut Finding, odds: &NameOdds) {
         evidence.delta_bic = 2.0 * odds.log;
     }
     let Probabilities { name, place, none } = finding.probabilities;
-    if finding.effect == names::UNKNOWN || none <= REJECTED {
+    if finding.effect == names::UNKNOWN || none <= *REJECTED {
         return;
     }
     finding.statement = none_of_the_list(finding.place, &finding.statement, none, odds.share);
@@ -164,7 +162,7 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
         let Hypothesis { positive, largest, ref form, .. } = last.pool.hypotheses[last.judged.set[*i]];
         let range = state.ranges[*i].clone();
         let error = |column: usize| match state.fitted.statuses[range.start + column] {
-            ParameterStatus::Free(sigma) => FIRM * sigma,
+            ParameterStatus::Free(sigma) => *FIRM * sigma,
             _ => 0.0,
         };
         let values = &state.model.x[range.clone()];
@@ -180,21 +178,18 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
         range.clone().find_map(|k| {
             let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else { return None };
             let value = state.model.x[k];
-            if positive && value < -FIRM * sigma {
+            if positive && value < -*FIRM * sigma {
                 Some("has the wrong sign".into())
             } else {
-                (value.abs() - FIRM * sigma > largest).then(|| "is more than is possible".into())
+                (value.abs() - *FIRM * sigma > largest).then(|| "is more than is possible".into())
             }
         })
     })
 }
 
-/// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went astray.
-const ASTRAY: f64 = 2.0;
-
 /// Why what the folds say is nothing of a cause: its absence costs more than all that it does.
 fn more_than_it_does(effect: &str, evidence: &Evidence, of: Dimension) -> Option<String> {
-    let gain = evidence.heldout_gain.filter(|gain| effect != names::UNKNOWN && *gain > ASTRAY * evidence.effect_rms)?;
+    let gain = evidence.heldout_gain.filter(|gain| effect != names::UNKNOWN && *gain > *ASTRAY * evidence.effect_rms)?;
     let [gain, all] = [gain, evidence.effect_rms].map(|size| small(size, of));
     Some(format!("other poses would gain {gain} by it, which is more than all that it does, {all} rms"))
 }
@@ -221,7 +216,7 @@ fn varying(own: &[usize], pool: &CachedHypotheses, whole: &Whole, gain: f64, clo
     let lost = whole.solution.gain - pool.solve(&named).gain;
     let by: Vec<String> = by.into_iter().map(|variable| clock.named(variable)).collect();
     let why = || format!("its size depends on the {}", by.join(" and the "));
-    (!by.is_empty() && lost > FINER_SHAPE * gain).then(|| (why(), pool.bic(&named) - whole.bic))
+    (!by.is_empty() && lost > *REFINEMENT * gain).then(|| (why(), pool.bic(&named) - whole.bic))
 }
 
 /// The fitted parameters of some causes, as people read them.

@@ -1,20 +1,18 @@
 //! What a recording cannot show whatever the truth, and what to measure so that it does.
 
+use crate::criteria::words::STILL;
 use crate::diagnose::types::Finding;
 use crate::diagnose::words::small;
 use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause};
 use crate::observation::{Dimension, noise, only_brought};
 use crate::robot::Measurements;
 
-/// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
-const STILL: f64 = 1e-3;
-
 /// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
 pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     let mut out = Vec::new();
     for (joint, reach) in reach.iter().enumerate() {
         let name = joint + 1;
-        if *reach < STILL {
+        if *reach < *STILL {
             out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
         } else if survey.travel(joint) < 0.02 {
             out.push(format!("joint {name}: it hardly moves; vary it over its range"));

@@ -4,20 +4,14 @@
 //! proportion to exp(-criterion / 2 T): the criterion is -2 ln of a posterior whose noise is the residual's, so T is 1 for forms that are
 //! right; true shapes differ a little from the library's, which T allows for (`tests/reference/calibrate_probability.py`).
 
+use crate::criteria::words::{FAULT, IDENTITY, TEMPERATURE};
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::types::{Finding, Probabilities, RivalCause};
 use crate::effect::names;
 
-/// T.
-const TEMPERATURE: f64 = 2.03;
-/// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
-const IDENTITY: f64 = 6.3;
-/// Faults of single rows are seen as such or not at all.
-const FAULT: f64 = 0.98;
-
 /// Sets the probabilities of a fault of single rows.
 pub(super) fn weigh_fault(fault: &mut Finding) {
-    fault.probabilities = Probabilities { name: FAULT, place: FAULT, none: 1.0 - FAULT };
+    fault.probabilities = Probabilities { name: *FAULT, place: *FAULT, none: 1.0 - *FAULT };
 }
 
 /// Sets the probabilities of a finding and of its rivals; `odds` are those of free forms against names.
@@ -34,8 +28,8 @@ pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds) {
 
 /// Of a rival beside a name whose weight is 1; only identities differ by nothing at all.
 fn weight(rival: &RivalCause) -> f64 {
-    let loss = if rival.delta_bic == 0.0 { IDENTITY } else { rival.delta_bic.max(0.0) };
-    (-loss / (2.0 * TEMPERATURE)).exp()
+    let loss = if rival.delta_bic == 0.0 { *IDENTITY } else { rival.delta_bic.max(0.0) };
+    (-loss / (2.0 * *TEMPERATURE)).exp()
 }
 
 /// Of a finding without a name: rivals share what free forms leave.

@@ -9,6 +9,8 @@ pub(crate) use verdict_statement::{Ground, statement};
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
+use crate::criteria::judge::RIVALS;
+use crate::criteria::words::NAMED;
 use crate::effect::Form;
 use crate::error::counted;
 
@@ -47,15 +49,12 @@ pub(crate) fn of_the_open_world(judged: &FitState) -> String {
     format!("what is in no list is asked at every place, beside {} and in their place", counted(judged.causes.len(), "cause"))
 }
 
-/// Causes of a round that are named.
-const NAMED: usize = 4;
-
 /// A round in a line, which leaves a residual that noise alone makes with a probability of `rest`.
 pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl Iterator<Item = &'f Form>, rest: f64) -> String {
     let names: Vec<String> = forms.map(|form| format!("{} at {}", form.name(), form.place())).collect();
     let (tried, causes) = (pool.hypotheses.len(), counted(names.len(), "cause"));
-    let mut shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-    if names.len() > NAMED {
+    let mut shown = names.iter().take(*NAMED).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > *NAMED {
         shown.push_str(", ...");
     }
     let shown = if shown.is_empty() { shown } else { format!(" ({shown})") };

@@ -7,12 +7,13 @@ use super::exchange::{Criterion, DesignTerm};
 use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::Site;
 use super::{median, random_sets, subset};
+use crate::criteria::choose::{OFF, POSTURES};
 use crate::effect::{EffectContext, EffectStack, Load, names, whole};
 use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::observation::{MeasurementKind, SocketKind, rank};
-use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
+use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, PointReadings, Readings, RobotModel, Target};
 use crate::spatial::Pose;
 use faer::Mat;
 use nalgebra::Vector3;
@@ -87,8 +88,6 @@ pub struct BroughtProposal {
     pub offsets: Vec<BallOffset>,
 }
 
-/// Random postures that are tried for one that closes, at most.
-const TRIES: usize = 200;
 /// Tried together.
 const BATCH: usize = 256;
 /// m; the ball lies in the socket.
@@ -99,8 +98,6 @@ const UNIT: f64 = 1e-3;
 const UNSEEN: f64 = 1e-9;
 /// Beginnings of the names of what belongs to the geometry of arm and ball.
 const GEOMETRY: [&str; 3] = ["tool_offset.", "joint_offset.", "link_geometry."];
-/// How far off the last axis a ball is tried, m.
-const OFF: [f64; 4] = [0.01, 0.02, 0.05, 0.1];
 
 /// The nominal arm with sockets, and what is to be told of it.
 fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>) -> Model {
@@ -125,8 +122,7 @@ fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
     let anchor = Some(Named::of(names.iter().map(String::as_str)));
     let readings = Readings { kind: SocketKind.about().name, sigma: vec![sigma; rows], anchor, ..Readings::default() };
     Measurements {
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(f64::INFINITY); rows],
+        points: PointReadings::none(rows),
         payload: vec![0.0; rows],
         readings: vec![readings],
         ..Measurements::default()
@@ -141,7 +137,7 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
     for (socket, place) in request.places.iter().enumerate() {
         let (mut own, mut tried) = (0, 0);
         while own < request.candidates {
-            if tried > TRIES * (own + BATCH) {
+            if tried > *POSTURES * (own + BATCH) {
                 let [x, y, z] = [place.x, place.y, place.z];
                 return Err(format!(
                     "socket [{x}, {y}, {z}] m is reached by {own} of {tried} random postures within the joints' limits: it is out of reach, \
@@ -172,7 +168,7 @@ fn candidates(model: &Model, site: &Site, request: &BroughtRequest) -> Result<(M
     let mut data = Measurements { joints: site.ranges.len(), ..socketed(sockets.clone(), request.sigma) };
     data.q = found.into_iter().flat_map(|(_, q)| q).collect();
     data.payload.fill(payload);
-    data.position = sockets.iter().map(|socket| request.places[*socket]).collect();
+    data.points.position = sockets.iter().map(|socket| request.places[*socket]).collect();
     Ok((data, sockets))
 }
 

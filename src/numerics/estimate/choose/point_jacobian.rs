@@ -102,7 +102,7 @@ impl PointJacobian {
             )
             .collect();
         let closing = |row: usize| data.reading(SocketKind.about().name, row).map(|reading| Vector3::repeat(reading.sigma));
-        let sigma: Vec<Vector3<f64>> = (0..data.rows()).map(|row| closing(row).unwrap_or(data.sigma[row])).collect();
+        let sigma: Vec<Vector3<f64>> = (0..data.rows()).map(|row| closing(row).unwrap_or(data.points.sigma[row])).collect();
         let mut out = Mat::zeros(3 * data.rows(), p);
         for (j, scale) in scale.iter().enumerate() {
             let column = out.col_as_slice_mut(j);
@@ -142,7 +142,7 @@ impl PointJacobian {
             }
         }
         let length = |(squares, sigma): (&[f64], &Vector3<f64>)| norm((0..3).map(|axis| squares[axis].sqrt() * sigma[axis]));
-        let mut lengths: Vec<f64> = squares.chunks_exact(3).zip(&workspace.sigma).map(length).collect();
+        let mut lengths: Vec<f64> = squares.chunks_exact(3).zip(&workspace.points.sigma).map(length).collect();
         let mut at = |share: f64| nearest(&mut lengths, share).unwrap_or(f64::NAN);
         Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: at(0.5) }
     }

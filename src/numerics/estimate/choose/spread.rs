@@ -1,7 +1,7 @@
 //! Poses spread evenly over the joint limits, the same at every call: a low-discrepancy sequence (Roberts' R sequence: fractional parts
 //! of multiples of the powers of the generalised golden ratio).
 
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, PointReadings, RobotModel};
 use nalgebra::Vector3;
 
 /// `rows` poses within the limits, rad or m, with the declared payload; a joint without limits keeps within 1 of its zero.
@@ -17,8 +17,7 @@ pub fn spread(robot: &RobotModel, rows: usize) -> Measurements {
     Measurements {
         joints: n,
         q: q.collect(),
-        position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::zeros(); rows],
+        points: PointReadings::new(vec![Vector3::zeros(); rows], 0.0),
         payload: vec![robot.description().payload_mass; rows],
         ..Measurements::default()
     }

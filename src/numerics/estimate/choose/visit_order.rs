@@ -116,7 +116,7 @@ fn turns(model: &Model, poses: &Measurements) -> Vec<f64> {
     for row in 0..poses.rows() {
         stack.derivatives(&model.robot, poses, row, &x, &mut scratch, |joint, derivative| {
             for axis in 0..3 {
-                out[(3 * row + axis) * poses.joints + joint] += derivative[axis] / poses.sigma[row][axis];
+                out[(3 * row + axis) * poses.joints + joint] += derivative[axis] / poses.points.sigma[row][axis];
             }
         });
     }

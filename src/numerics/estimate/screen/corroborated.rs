@@ -2,25 +2,21 @@
 //!
 //! A row that no model was fitted to judges the model; the model's own failure there is no evidence against the row.
 
+use crate::criteria::screen::{DISAGREES, IMPOSSIBLE, JOINTS};
 use crate::robot::Measurements;
-
-/// Two measurements of one target in one pose that are this many times their noise apart: one of them is wrong.
-const DISAGREES: f64 = 10.0;
-/// Repeats of a pose scatter by less than this, whatever the joints do, m.
-const JOINTS: f64 = 0.5e-3;
-/// No joint, gear or tool that still moves puts a point so far off, m.
-const IMPOSSIBLE: f64 = 20e-3;
+use nalgebra::Vector3;
 
 /// Whether more than the model speaks against a row that is `off` by so much, m.
 pub(super) fn is_wrong(data: &Measurements, row: usize, off: f64) -> bool {
-    if off > IMPOSSIBLE {
+    if off > *IMPOSSIBLE {
         return true;
     }
-    let again = |other: &usize| *other != row && data.whole(*other) && data.target(*other) == data.target(row);
-    let mut repeats = (0..data.rows()).filter(again).filter(|other| data.same_pose(row, *other)).peekable();
-    let apart = |other: usize| {
+    let Some(point) = data.point(row) else { return false };
+    let again = |other: &usize| *other != row && data.target(*other) == data.target(row) && data.same_pose(row, *other);
+    let mut repeats = (0..data.rows()).filter(again).filter_map(|other| Some((other, data.point(other)?))).peekable();
+    let apart = |(other, measured): (usize, Vector3<f64>)| {
         let noise = data.noise(row).hypot(data.noise(other));
-        (data.position[row] - data.position[other]).norm() > (DISAGREES * noise).max(JOINTS)
+        (point - measured).norm() > (*DISAGREES * noise).max(*JOINTS)
     };
-    data.whole(row) && repeats.peek().is_some() && repeats.all(apart)
+    repeats.peek().is_some() && repeats.all(apart)
 }

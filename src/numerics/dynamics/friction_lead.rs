@@ -1,0 +1,64 @@
+//! By how much friction turns before the velocity does: friction that a simulator lets a solver find turns with velocity and
+//! acceleration, and velocities that a drive smooths lag behind the friction that it feels.
+
+use super::problem::TorqueProblem;
+use super::sign_width::{FrictionFit, own_sign_widths, sign_width};
+
+/// s: most on either side, and the first step.
+const MOST: f64 = 0.024;
+const STEP: f64 = 0.004;
+/// s: steps about the best of the grid.
+const STEPS: [f64; 3] = [0.002, 0.001, 0.0005];
+/// s: less is none; two that differ by less are one.
+const LEAST: f64 = 0.001;
+const SAME: f64 = 3e-4;
+/// Fall of rows times the logarithm of the mean square, over all joints; residuals last over some rows.
+const GAIN: f64 = 200.0;
+/// The same of one joint, to agree.
+const OWN_GAIN: f64 = 10.0;
+/// Of the joints that must agree.
+const AGREEING: f64 = 0.6;
+
+/// Takes the lead that most joints agree on, 0 where they do not, with the width of the sign beside it; tells whether it is another than
+/// before.
+pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
+    let before = problem.scene.friction_lead;
+    let fit = FrictionFit::new(problem);
+    let mut left_by = |lead: f64| {
+        problem.scene.friction_lead = lead;
+        fit.left(problem)
+    };
+    let unmoved = left_by(0.0);
+    let mut best = (unmoved.iter().sum::<f64>(), 0.0);
+    let mut try_lead = |lead: f64, best: &mut (f64, f64)| {
+        let left = left_by(lead).iter().sum::<f64>();
+        if left < best.0 {
+            *best = (left, lead);
+        }
+    };
+    let steps = (MOST / STEP).round() as i32;
+    (-steps..=steps).filter(|step| *step != 0).for_each(|step| try_lead(STEP * f64::from(step), &mut best));
+    for step in STEPS {
+        let about = best.1;
+        [about - step, about + step].iter().for_each(|lead| try_lead(*lead, &mut best));
+    }
+    let left = left_by(best.1);
+    let rows = fit.rows() as f64;
+    let gains: Vec<f64> = unmoved.iter().zip(&left).map(|(unmoved, left)| rows * (unmoved - left)).collect();
+    let agreeing = gains.iter().filter(|gain| **gain > OWN_GAIN).count();
+    let needed = ((AGREEING * gains.len() as f64).ceil() as usize).max(2);
+    let is_one = best.1.abs() > LEAST && gains.iter().sum::<f64>() > GAIN && agreeing >= needed;
+    let found = if is_one { best.1 } else { 0.0 };
+    let is_new = (found - before).abs() > SAME;
+    problem.scene.friction_lead = if is_new { found } else { before };
+    if is_new {
+        let width = sign_width(problem);
+        problem.scene.turn_over(width);
+        if is_one {
+            // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
+            let own = own_sign_widths(problem);
+            problem.scene.turn_each_over(own);
+        }
+    }
+    is_new
+}
