@@ -85,7 +85,7 @@ pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64
 }
 
 /// Names with places, sorted.
-fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
+pub(super) fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
     let mut names: Vec<String> = diagnosis.findings.iter().map(|f| format!("{} {}", f.effect, f.place)).collect();
     names.sort();
     names
