@@ -11,7 +11,8 @@ pub(super) struct Stribeck;
 const USUAL: f64 = 0.1;
 /// Widths of the sign.
 const NARROWEST: f64 = 2.0;
-const SPEEDS: [&[f64]; 5] = [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0]];
+const SPEEDS: [&[f64]; 8] =
+    [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0], &[0.06, 2.0], &[USUAL, 2.0], &[0.17, 2.0]];
 /// Of speed over its scale: 1 as a rule, found between these (Armstrong-Helouvry, 1991, reports 0.5 to 2).
 const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
@@ -22,6 +23,10 @@ impl TorqueCause for Stribeck {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Stribeck, scene, 1, &SPEEDS)
+    }
+
+    fn price(&self, form: &TorqueForm) -> f64 {
+        if form.shape.get(1).is_none_or(|exponent| *exponent == 1.0) { 6.0 } else { 10.0 }
     }
 
     fn modifies(&self) -> &'static [&'static str] {
