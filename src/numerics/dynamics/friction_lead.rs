@@ -68,3 +68,38 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
     }
     is_new
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::{arm, record};
+    use super::super::{TorqueQuestion, diagnose};
+
+    /// s.
+    const LEAD: f64 = 0.0095;
+
+    /// Lead (s) that is found of friction that turns as a solver lets it, over a width (rad/s) of each joint; findings beside plain friction.
+    fn found(latency: f64) -> (f64, Vec<String>) {
+        let widths = [0.001, 0.002, 0.006, 0.03];
+        let soft = |(joint, _, _, velocity, acceleration, _): (usize, f64, f64, f64, f64, f64)| {
+            3.0 * velocity + 8.0 * ((velocity + LEAD * acceleration) / widths[joint]).clamp(-1.0, 1.0)
+        };
+        let diagnosis = diagnose(&arm(), &record(&arm(), latency, &soft), &TorqueQuestion::default(), &mut |_| ()).unwrap();
+        let others =
+            diagnosis.findings.iter().filter(|finding| !["viscous_friction", "coulomb_friction"].contains(&finding.effect));
+        let others = others.map(|finding| finding.statement.clone());
+        (diagnosis.model.friction_lead, others.collect())
+    }
+
+    #[test]
+    fn friction_that_turns_before_the_velocity_is_plain_friction_with_its_lead() {
+        let (lead, others) = found(0.0);
+        assert!((lead - LEAD).abs() < 0.001 && others.is_empty(), "{lead}: {others:?}");
+    }
+
+    #[test]
+    fn torques_that_come_late_are_told_from_friction_that_turns_early() {
+        let (lead, others) = found(0.014);
+        assert!((lead - LEAD).abs() < 0.0015, "{lead}: {others:?}");
+        assert!(others.len() == 1 && others[0].starts_with("torques come 1"), "{others:?}");
+    }
+}
