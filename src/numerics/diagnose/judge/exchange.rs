@@ -5,7 +5,7 @@ use super::comparison::{ModelComparison, others};
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Effect, Place, Unknown, follows};
+use crate::effect::{Place, Unknown, follows};
 
 /// Rivals that are tried in place of a cause.
 pub(crate) const RIVALS: usize = 4;

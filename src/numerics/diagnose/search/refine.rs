@@ -2,7 +2,7 @@
 
 use super::{CauseSearch, with};
 use crate::diagnose::pool::Beside;
-use crate::effect::{Effect, Hypothesis};
+use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
 
 /// Families of shapes that are refined before candidates are compared.

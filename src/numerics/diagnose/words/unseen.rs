@@ -1,7 +1,7 @@
 //! What the way of a moving arm is too short or too slow to show: there geometry takes up most of what depends on the speed.
 
 use super::last_round::LastRound;
-use crate::effect::{Effect, JointLogLag, Place, Variable, ViscousWindup};
+use crate::effect::{JointLogLag, Place, Variable, ViscousWindup};
 use crate::units::Unit;
 
 /// Standard deviations from which on a cause is found.
