@@ -1,10 +1,10 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
+use super::joint_compliance::JointCompliance;
 use super::joint_table::{JointTable, strongest_orders};
 use super::summary::amplitude;
-use super::unweighed_windup::UnweighedWindup;
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
     Variable, orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
@@ -69,7 +69,7 @@ impl Cause for GearCyclic {
 
     fn sentence(&self, summary: &Summary) -> String {
         let mut orders: Vec<String> = summary.estimates(Self::NAME).map(|(term, numbers)| order(term, &numbers)).collect();
-        let weight = summary.form::<UnweighedWindup>().map(|windup| windup.largest(summary));
+        let weight = summary.words(JointCompliance::NAME);
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
@@ -83,9 +83,9 @@ impl Cause for GearCyclic {
         &["unknown"]
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        let first = form.term().is_some_and(|term| matches!(term.basis(), Basis::Wave { order: 1, .. }));
-        if first { vec![("counterbalance", form.place())] } else { Vec::new() }
+    fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
+        let first = matches!(term.basis(), Basis::Wave { order: 1, .. });
+        if first { vec![("counterbalance", term.motion().place())] } else { Vec::new() }
     }
 }
 

@@ -9,8 +9,8 @@ use super::motion::{SHORT, extent};
 use super::orders;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
-    Variable, warmth,
+    Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term, Variable,
+    warmth,
 };
 use super::{frames, interactions};
 use crate::criteria::effect::{HARDLY_EVER, LOW_ORDERS, OPEN, RARE, RARER, UNCOMMON};
@@ -309,16 +309,16 @@ impl Cause for Unknown {
         &["gear_cyclic", "joint_table"]
     }
 
-    fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
-        let Some(term) = form.term() else { return Vec::new() };
-        let joint = matches!(form.place(), Place::Joint(_));
+    fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
+        let place = term.motion().place();
+        let joint = matches!(place, Place::Joint(_));
         match (term.basis(), term.law().first.of) {
             (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
                 vec![("axis_wobble", Place::Joint(by))]
             }
             // No motor current tells of a pull.
-            _ if called == "cable_drag" => vec![(Self::NAME, form.place())],
-            _ if joint && term.two_angles().is_some() => vec![("cable_drag", form.place())],
+            _ if called == "cable_drag" => vec![(Self::NAME, place)],
+            _ if joint && term.two_angles().is_some() => vec![("cable_drag", place)],
             _ => Vec::new(),
         }
     }

@@ -1,6 +1,6 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
+use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 /// A joint zero that steps at some time.
@@ -40,8 +40,8 @@ impl Cause for ZeroShift {
         format!("the zero of {} steps by {}{}", summary.place, summary.size(), summary.when(self.name()))
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        if form.place() == Place::Joint(0) { vec![("base_shift", Place::Base)] } else { Vec::new() }
+    fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
+        if term.motion().place() == Place::Joint(0) { vec![("base_shift", Place::Base)] } else { Vec::new() }
     }
 
     fn measure(&self) -> Option<Measure> {

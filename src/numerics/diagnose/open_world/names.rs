@@ -9,7 +9,7 @@ use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
 use crate::diagnose::words::FindingKey;
-use crate::effect::{Effect, Place, Unknown};
+use crate::effect::{Place, Unknown};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

@@ -4,7 +4,7 @@ use super::free_form::FreeTerm;
 use crate::diagnose::judge::{FoldErrors, JudgedCauses};
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
-use crate::effect::{Effect, Hypothesis};
+use crate::effect::Hypothesis;
 use crate::estimate::Prior;
 
 /// A changed model.

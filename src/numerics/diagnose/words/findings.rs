@@ -13,9 +13,7 @@ use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
-use crate::effect::{
-    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people,
-};
+use crate::effect::{Basis, Clock, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people};
 use crate::estimate::{ErrorScale, ParameterStatus, tail};
 use crate::observation::Dimension;
 
@@ -156,7 +154,7 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
         let values = &state.model.x[range.clone()];
         // The finer shape of a finding is not what it is called by.
         let own = effect != Unknown::NAME && [form.name(), form.called(values, last.survey)].contains(&effect);
-        let beyond = own.then(|| form.cause().impossible(form, values, &error, last.survey)).flatten();
+        let beyond = own.then(|| form.impossible(values, &error, last.survey)).flatten();
         if beyond.is_some() {
             return beyond;
         }

@@ -2,7 +2,7 @@
 
 use super::last_round::LastRound;
 use crate::criteria::words::{CLOCKS, FOUND};
-use crate::effect::{Effect, JointLogLag, Place, Variable, ViscousWindup};
+use crate::effect::{JointLogLag, Place, Variable, ViscousWindup};
 use crate::units::Unit;
 
 const TRAIL: f64 = 5.0 / 3600.0;
