@@ -7,14 +7,14 @@
 
 #![allow(clippy::print_stdout, reason = "a program of its own")]
 
-use calib::criteria::{Factor, reached, scale};
-use calib::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
-use calib::estimate::gauge;
-use calib::robot::{Measurements, NoiseBasis, RobotModel, Sequence};
-use calib::twin::conceal::case::Case;
-use calib::twin::conceal::design::{Content, Design};
-use calib::twin::conceal::family::Column;
-use calib::twin::conceal::points::FIT;
+use calib_numerics::criteria::{CriterionFactor, reached, scale};
+use calib_numerics::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
+use calib_numerics::estimate::gauge;
+use calib_numerics::robot::{Measurements, NoiseBasis, RobotModel, Sequence};
+use calib_twin::conceal::case::Case;
+use calib_twin::conceal::design::{Content, Design};
+use calib_twin::conceal::family::Column;
+use calib_twin::conceal::points::FIT;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -47,7 +47,8 @@ fn diagnosed(case: &Case, data: &Measurements, without: &[String]) -> Diagnosis 
     if case.bare {
         description.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
-    let (robot, _) = gauge(RobotModel::new(description), data, &fit, &BTreeMap::new()).expect("a concealed recording has a gauge");
+    let (robot, _) =
+        gauge(RobotModel::new(description), data, &fit, &BTreeMap::new()).expect("a concealed recording has a gauge");
     let question = Question {
         robot: &robot,
         data,
@@ -85,14 +86,16 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
     });
     let floor = 3f64.sqrt() * case.noise_mm[1];
     let held_out = found.after.as_ref().map_or(f64::NAN, |errors| errors.rms * 1e3) / floor;
+    let before = found.before.as_ref().map_or(f64::NAN, |errors| errors.rms * 1e3) / floor;
     let silent = named.is_empty();
     let explained = found.verdict != VerdictKind::Unexplained;
-    serde_json::json!({ "exact": exact, "placed": placed, "wrong": wrong, "silent": silent, "explained": explained, "held_out": held_out })
+    serde_json::json!({ "exact": exact, "placed": placed, "wrong": wrong, "silent": silent, "explained": explained, "held_out": held_out, "before": before, "found": named })
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT [CRITERION ...]");
+    let number =
+        |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT [CRITERION ...]");
     let (seed, first, count) = (number(0) as u64, number(1), number(2));
     let wanted = arguments.get(3..).unwrap_or_default();
     let last = first + count;
@@ -119,11 +122,11 @@ fn main() {
             line["factor"] = factor.into();
             println!("{line}");
         };
-        scale("", Factor::One);
+        scale("", CriterionFactor::One);
         reached();
         tell("", 1.0);
         for criterion in reached().iter().filter(|name| wanted.is_empty() || wanted.contains(name)) {
-            for (factor, times) in [(Factor::Half, 0.5), (Factor::Double, 2.0)] {
+            for (factor, times) in [(CriterionFactor::Half, 0.5), (CriterionFactor::Double, 2.0)] {
                 scale(criterion, factor);
                 tell(criterion, times);
             }
