@@ -16,10 +16,12 @@ pub(crate) struct FoldGain {
 
 /// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
 pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
-    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
-    let random = FoldKind::Random(fitter.question.seed);
-    let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
-    dealt(kind, &now.session(fitter), *FOLDS)
+    dealt(kind(fitter), &now.session(fitter), *FOLDS)
+}
+
+/// Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
+fn kind(fitter: &Fitter) -> FoldKind {
+    if fitter.correlated.is_some() { FoldKind::Blocks } else { FoldKind::Random(fitter.question.seed) }
 }
 
 /// Errors of the rows that were fitted.
@@ -35,8 +37,17 @@ pub(crate) struct FoldErrors {
 impl FoldErrors {
     /// `None` where the poses are too few for folds.
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
+        Self::of_folds(kind(fitter), now, fitter)
+    }
+
+    /// Where each fold is a stretch of the recording, the first and the last among them. `None` where the poses are too few.
+    pub fn of_stretches(now: &FitState, fitter: &Fitter) -> Option<Self> {
+        Self::of_folds(FoldKind::Blocks, now, fitter)
+    }
+
+    fn of_folds(kind: FoldKind, now: &FitState, fitter: &Fitter) -> Option<Self> {
         let session = now.session(fitter);
-        let folds = folds(now, fitter)?;
+        let folds = dealt(kind, &session, *FOLDS)?;
         Some(Self::gathered(&session, &folds, &session.without_each(&folds, fitter.scale), fitter.scale))
     }
 

@@ -41,6 +41,12 @@ impl FreeGroup {
         self.motion.place()
     }
 
+    /// Whether it depends on what drifts with the recording: rows after it are beyond all that was seen.
+    pub fn follows_time(&self) -> bool {
+        let drifts = |of: Variable| matches!(of, Variable::Time | Variable::Temperature | Variable::Lagging { .. });
+        self.law.factors().any(|factor| drifts(factor.of))
+    }
+
     /// As what may join the model: a law without a name.
     pub fn hypothesis(&self) -> Hypothesis {
         Hypothesis::new(Term::new(&Unknown, self.motion, self.law), 1)

@@ -4,7 +4,7 @@ use super::evidence::{evidence, log_sum};
 use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
-use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NOTHING, PLACES, RIVALS};
+use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NEARLY, NOTHING, PLACES, RIVALS};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
@@ -97,6 +97,8 @@ pub(super) struct NamedFinding {
     pub members: Vec<usize>,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
     pub own: Vec<(usize, f64)>,
+    /// Those of them that are of laws of the list.
+    pub lawful: Vec<(usize, f64)>,
 }
 
 /// What the judgement of a finding rests on.
@@ -119,12 +121,7 @@ impl NameCase<'_, '_, '_, '_> {
     ) -> ContestedName {
         let (effect, place) = named.key;
         let set = &self.judged.set;
-        let own = {
-            let columns = named.own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
-            let picked = self.around.causes.columns.select_columns(&columns);
-            let variances: Vec<f64> = named.own.iter().map(|(_, variance)| *variance).collect();
-            self.evidence_of(rest, &picked, &variances)
-        };
+        let own = self.evidence_of_causes(rest, &named.own);
         let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
         let [open, listed] = self.priors(instead.logs.len());
         let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
@@ -139,7 +136,13 @@ impl NameCase<'_, '_, '_, '_> {
         }
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
-        let mut free: Vec<(Place, f64)> = instead.logs.iter().map(|(place, log)| (*place, open + log)).collect();
+        let free = instead.logs.iter().map(|(place, log)| (*place, open + log));
+        let (finer, mut free): (Vec<_>, Vec<_>) = if is_named && self.is_nearly_all(named, rest, &own, instead) {
+            free.partition(|(at, _)| *at == place)
+        } else {
+            (Vec::new(), free.collect())
+        };
+        names.extend(finer);
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
         } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= *FINER) {
@@ -162,6 +165,22 @@ impl NameCase<'_, '_, '_, '_> {
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
         ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+    }
+
+    /// Whether the named laws of a finding explain nearly all of what the free form at its place does instead of it.
+    fn is_nearly_all(&self, named: &NamedFinding, rest: &KnownCauses, own: &Own, instead: &SurveyedPlaces) -> bool {
+        let Some(form) = instead.best.iter().find(|form| form.place == named.key.1) else { return false };
+        let gain =
+            if named.lawful.len() < named.own.len() { self.evidence_of_causes(rest, &named.lawful).gain } else { own.gain };
+        gain > (1.0 - *NEARLY) * own.gain.max(form.gain)
+    }
+
+    /// Evidence and fall of the squared residual of some columns of the model's causes beside a state.
+    fn evidence_of_causes(&self, rest: &KnownCauses, own: &[(usize, f64)]) -> Own {
+        let columns = own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
+        let picked = self.around.causes.columns.select_columns(&columns);
+        let variances: Vec<f64> = own.iter().map(|(_, variance)| *variance).collect();
+        self.evidence_of(rest, &picked, &variances)
     }
 
     /// ln of a hypothesis' prior odds, negative; of what is called by a name only when it is fitted those of its kind and place.
