@@ -25,9 +25,9 @@ ROOM = pathlib.Path(__file__).resolve().parents[2] / "src/numerics/criteria"
 SCORES = ["exact", "placed", "wrong", "explained", "silent"]
 
 
-def scores(program, seed, recording, only):
+def scores(program, seed, recording, points, only):
     """The lines of one recording."""
-    command = [program, str(seed), str(recording), "1", *only]
+    command = [program, str(seed), str(recording), "1", str(points), *only]
     run = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"RAYON_NUM_THREADS": "1"})
     return [json.loads(line) for line in run.stdout.splitlines()]
 
@@ -83,6 +83,7 @@ def main():
     parser.add_argument("--program", type=os.path.abspath, default="target/debug/examples/ablate")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--recordings", type=int, default=24)
+    parser.add_argument("--points", type=int, default=0, help="to fit, of every recording [50 to 400]")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", nargs="*", default=[], help="criteria, as room::NAME")
     parser.add_argument("--lines", type=pathlib.Path)
@@ -92,7 +93,7 @@ def main():
     lines = [json.loads(line) for line in kept]
     todo = sorted(set(range(arguments.recordings)) - {line["recording"] for line in lines})
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for some in pool.map(lambda one: scores(arguments.program, arguments.seed, one, arguments.only), todo):
+        for some in pool.map(lambda one: scores(arguments.program, arguments.seed, one, arguments.points, arguments.only), todo):
             lines += some
             if arguments.lines:
                 with arguments.lines.open("a") as out:

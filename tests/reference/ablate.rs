@@ -1,9 +1,9 @@
 //! Scores of concealed recordings with each criterion halved and doubled, a line of JSON each; `ablate.py` runs it and makes the table.
 //!
-//!     ablate SEED FIRST COUNT [CRITERION ...]
+//!     ablate SEED FIRST COUNT POINTS [CRITERION ...]
 //!
 //! Recordings FIRST to FIRST + COUNT of the seed, in three worlds by turns: one cause of the list, the same with that cause taken out of the
-//! list, and physics of no list. Only what a recording came by is scaled.
+//! list, and physics of no list; POINTS to fit, 0 for 50 to 400. Only what a recording came by is scaled; `-` for no criterion.
 
 #![allow(clippy::print_stdout, reason = "a program of its own")]
 
@@ -76,7 +76,7 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
     let same = |want: &(&str, String), own: &(&str, String, f64)| want.0 == own.0 && want.1 == own.1;
     let (want, all) = (case.want(), case.want_all());
     let accepted = |own: &(&str, String, f64)| {
-        all.iter().any(|want| same(want, own)) || case.accepted.iter().any(|(effect, place)| effect == own.0 && *place == own.1)
+        all.iter().any(|want| same(want, own)) || case.accepted.iter().any(|(effect, place)| *effect == own.0 && *place == own.1)
     };
     let exact = is_listed && want.iter().all(|want| named.iter().any(|own| same(want, own))) && named.iter().all(&accepted);
     let wrong = named.iter().any(|own| own.0 != "unknown" && own.2 >= 0.5 && !(is_listed && accepted(own)));
@@ -95,12 +95,13 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number =
-        |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT [CRITERION ...]");
+        |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT POINTS [CRITERION ...]");
     let (seed, first, count) = (number(0) as u64, number(1), number(2));
-    let wanted = arguments.get(3..).unwrap_or_default();
+    let points = Some(number(3)).filter(|points| *points > 0);
+    let wanted = arguments.get(4..).unwrap_or_default();
     let last = first + count;
-    let listed = Design { seed, cases: 8 * last, nulls: 0.1, faulty: 0.0, ..Design::default() };
-    let foreign = Design { seed, cases: last, foreign: 1.0, faulty: 0.0, ..Design::default() };
+    let listed = Design { seed, cases: 8 * last, nulls: 0.1, faulty: 0.0, points, ..Design::default() };
+    let foreign = Design { seed, cases: last, foreign: 1.0, faulty: 0.0, points, ..Design::default() };
     let mut listed_cases = listed.contents().into_iter().enumerate().filter(|(_, content)| matches!(content, Content::Single(_)));
     let mut foreign_cases = foreign.contents().into_iter().enumerate();
     for recording in 0..last {
