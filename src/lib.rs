@@ -115,7 +115,9 @@
 //! | word | what it means here |
 //! |---|---|
 //! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
-//! | form | a cause at a place with its shape numbers; a hypothesis is a form that a search may choose |
+//! | form | a cause at a place with its shape numbers: a term, or a motion with physics of its own; a hypothesis is a form that a search may choose |
+//! | term | a form that is a law times a motion at a place |
+//! | reading | what a row measured of one kind; a point is a reading like any other, and may lack axes |
 //! | declared effect | a cause that a user states in YAML: place, motion, laws as formulas; its forms carry the declaration |
 //! | closed form | a formula proposed for a finding without a name |
 //! | place | where on the chain (or in the measurement) a cause acts: joint 2, link 3, base, tool, recording |

@@ -39,7 +39,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
     let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
-        let of = |effect: &'static str| rows(effect).find(|row| row.place == place).map_or(Value::Null, number);
+        let of = |effect: &'static str| rows(effect).find(|row| row.place == place && row.form.is_some()).map_or(Value::Null, number);
         let seen = &model.range[index];
         json!({
             "name": joint.name, "viscous": of("viscous_friction"), "coulomb": of("coulomb_friction"),

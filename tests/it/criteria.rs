@@ -12,7 +12,7 @@ const KINDS: [&str; 5] = ["literature: ", "physics: ", "count: ", "measured by t
 const ROOMS: [&str; 3] = ["numerics/diagnose/", "numerics/estimate/choose/", "numerics/estimate/screen/"];
 
 /// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
-const MECHANICS: [&str; 37] = [
+const MECHANICS: [&str; 39] = [
     "AMPLITUDES",
     "ANGLE",
     "ARCSEC",
@@ -24,6 +24,7 @@ const MECHANICS: [&str; 37] = [
     "FINE",
     "FITTED",
     "FOLDS",
+    "FORMS",
     "FREEDOMS",
     "HIGHEST",
     "INVISIBLE",
@@ -41,6 +42,7 @@ const MECHANICS: [&str; 37] = [
     "ROWS",
     "SETTLED",
     "SHARES",
+    "SHORT",
     "SLIPS",
     "SMALLEST",
     "STEP",

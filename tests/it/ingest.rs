@@ -57,6 +57,7 @@ pub fn robot(kinds: &str, half_turns: f64) -> Robot {
         tolerance_mass: None,
         tolerance_centre_mm: None,
         tolerance_inertia: None,
+        coulomb_nm: None,
     };
     Robot(kinds.chars().zip(1..).map(row).collect())
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What halving and doubling does of every number by which a diagnosis decides (src/numerics/criteria).
 
-    cargo build --example ablate --features ablate --no-default-features
+    cargo build -p calib -p calib-numerics --example ablate --features calib-numerics/ablate
     python3 tests/reference/ablate.py --program target/debug/examples/ablate --seed 7 --recordings 24 --jobs 1 [--lines FILE] [--write]
 
 Recordings are concealed ones, by turns with a cause of the list, with that cause taken out of the list, and with physics of no list. A
@@ -25,9 +25,9 @@ ROOM = pathlib.Path(__file__).resolve().parents[2] / "src/numerics/criteria"
 SCORES = ["exact", "placed", "wrong", "explained", "silent"]
 
 
-def scores(program, seed, recording, only):
+def scores(program, seed, recording, points, only):
     """The lines of one recording."""
-    command = [program, str(seed), str(recording), "1", *only]
+    command = [program, str(seed), str(recording), "1", str(points), *only]
     run = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"RAYON_NUM_THREADS": "1"})
     return [json.loads(line) for line in run.stdout.splitlines()]
 
@@ -83,6 +83,7 @@ def main():
     parser.add_argument("--program", type=os.path.abspath, default="target/debug/examples/ablate")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--recordings", type=int, default=24)
+    parser.add_argument("--points", type=int, default=0, help="to fit, of every recording [50 to 400]")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", nargs="*", default=[], help="criteria, as room::NAME")
     parser.add_argument("--lines", type=pathlib.Path)
@@ -92,7 +93,7 @@ def main():
     lines = [json.loads(line) for line in kept]
     todo = sorted(set(range(arguments.recordings)) - {line["recording"] for line in lines})
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for some in pool.map(lambda one: scores(arguments.program, arguments.seed, one, arguments.only), todo):
+        for some in pool.map(lambda one: scores(arguments.program, arguments.seed, one, arguments.points, arguments.only), todo):
             lines += some
             if arguments.lines:
                 with arguments.lines.open("a") as out:

@@ -1,20 +1,20 @@
 //! Scores of concealed recordings with each criterion halved and doubled, a line of JSON each; `ablate.py` runs it and makes the table.
 //!
-//!     ablate SEED FIRST COUNT [CRITERION ...]
+//!     ablate SEED FIRST COUNT POINTS [CRITERION ...]
 //!
 //! Recordings FIRST to FIRST + COUNT of the seed, in three worlds by turns: one cause of the list, the same with that cause taken out of the
-//! list, and physics of no list. Only what a recording came by is scaled.
+//! list, and physics of no list; POINTS to fit, 0 for 50 to 400. Only what a recording came by is scaled; `-` for no criterion.
 
 #![allow(clippy::print_stdout, reason = "a program of its own")]
 
-use calib::criteria::{Factor, reached, scale};
-use calib::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
-use calib::estimate::gauge;
-use calib::robot::{Measurements, NoiseBasis, RobotModel, Sequence};
-use calib::twin::conceal::case::Case;
-use calib::twin::conceal::design::{Content, Design};
-use calib::twin::conceal::family::Column;
-use calib::twin::conceal::points::FIT;
+use calib_numerics::criteria::{CriterionFactor, reached, scale};
+use calib_numerics::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
+use calib_numerics::estimate::gauge;
+use calib_numerics::robot::{Measurements, NoiseBasis, RobotModel, Sequence};
+use calib_twin::conceal::case::Case;
+use calib_twin::conceal::design::{Content, Design};
+use calib_twin::conceal::family::Column;
+use calib_twin::conceal::points::FIT;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -47,7 +47,8 @@ fn diagnosed(case: &Case, data: &Measurements, without: &[String]) -> Diagnosis 
     if case.bare {
         description.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
     }
-    let (robot, _) = gauge(RobotModel::new(description), data, &fit, &BTreeMap::new()).expect("a concealed recording has a gauge");
+    let (robot, _) =
+        gauge(RobotModel::new(description), data, &fit, &BTreeMap::new()).expect("a concealed recording has a gauge");
     let question = Question {
         robot: &robot,
         data,
@@ -75,7 +76,7 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
     let same = |want: &(&str, String), own: &(&str, String, f64)| want.0 == own.0 && want.1 == own.1;
     let (want, all) = (case.want(), case.want_all());
     let accepted = |own: &(&str, String, f64)| {
-        all.iter().any(|want| same(want, own)) || case.accepted.iter().any(|(effect, place)| effect == own.0 && *place == own.1)
+        all.iter().any(|want| same(want, own)) || case.accepted.iter().any(|(effect, place)| *effect == own.0 && *place == own.1)
     };
     let exact = is_listed && want.iter().all(|want| named.iter().any(|own| same(want, own))) && named.iter().all(&accepted);
     let wrong = named.iter().any(|own| own.0 != "unknown" && own.2 >= 0.5 && !(is_listed && accepted(own)));
@@ -85,19 +86,23 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
     });
     let floor = 3f64.sqrt() * case.noise_mm[1];
     let held_out = found.after.as_ref().map_or(f64::NAN, |errors| errors.rms * 1e3) / floor;
+    let before = found.before.as_ref().map_or(f64::NAN, |errors| errors.rms * 1e3) / floor;
     let silent = named.is_empty();
     let explained = found.verdict != VerdictKind::Unexplained;
-    serde_json::json!({ "exact": exact, "placed": placed, "wrong": wrong, "silent": silent, "explained": explained, "held_out": held_out })
+    serde_json::json!({ "exact": exact, "placed": placed, "wrong": wrong, "silent": silent, "explained": explained, "held_out": held_out, "before": before, "found": named })
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT [CRITERION ...]");
+    let number = |at: usize| {
+        arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT POINTS [CRITERION ...]")
+    };
     let (seed, first, count) = (number(0) as u64, number(1), number(2));
-    let wanted = arguments.get(3..).unwrap_or_default();
+    let points = Some(number(3)).filter(|points| *points > 0);
+    let wanted = arguments.get(4..).unwrap_or_default();
     let last = first + count;
-    let listed = Design { seed, cases: 8 * last, nulls: 0.1, faulty: 0.0, ..Design::default() };
-    let foreign = Design { seed, cases: last, foreign: 1.0, faulty: 0.0, ..Design::default() };
+    let listed = Design { seed, cases: 8 * last, nulls: 0.1, faulty: 0.0, points, ..Design::default() };
+    let foreign = Design { seed, cases: last, foreign: 1.0, faulty: 0.0, points, ..Design::default() };
     let mut listed_cases = listed.contents().into_iter().enumerate().filter(|(_, content)| matches!(content, Content::Single(_)));
     let mut foreign_cases = foreign.contents().into_iter().enumerate();
     for recording in 0..last {
@@ -119,11 +124,11 @@ fn main() {
             line["factor"] = factor.into();
             println!("{line}");
         };
-        scale("", Factor::One);
+        scale("", CriterionFactor::One);
         reached();
         tell("", 1.0);
         for criterion in reached().iter().filter(|name| wanted.is_empty() || wanted.contains(name)) {
-            for (factor, times) in [(Factor::Half, 0.5), (Factor::Double, 2.0)] {
+            for (factor, times) in [(CriterionFactor::Half, 0.5), (CriterionFactor::Double, 2.0)] {
                 scale(criterion, factor);
                 tell(criterion, times);
             }

@@ -57,7 +57,7 @@ def main():
     for case in sorted(path for path in told.folder.iterdir() if (path / "want.json").exists()):
         want = json.loads((case / "want.json").read_text())
         cause, mark, strays, found = marked(want, diagnosed(told.calib, told.pipeline, case))
-        friction = "frictionloss" if want["frictionloss"] else "gear"
+        friction = want["friction"]
         right = not strays and (cause is None or mark["exact"])
         if not right:
             said = f"{cause['effect']} at {cause['where']}, L {cause['L']:.0f}" if cause else "nothing"

@@ -8,11 +8,14 @@
 Three arms (5, 6 and 7 turning joints), 100 to 500 Hz, sums of sines and moves from point to point, steps of the encoders, noise of the
 currents. Each folder has robot.json and recording.csv (what a user has) and want.json (what MuJoCo's model has besides, L of the hidden cause
 and the names that data cannot tell from it). Every joint has MuJoCo's damping and dry friction; one further cause is hidden in four of five
-recordings. Torques are those of mj_inverse.
+recordings.
 
-In every second pair of recordings dry friction is MuJoCo's `frictionloss` as a model has it by default: a soft constraint whose torque is
--loss * clip((a + b v) / (R loss)), with b = 2 / (0.95 * 0.02 s) by solref and solimp. It turns as the sign of v + a / b does: 9.5 ms before
-the velocity, and over a width of R loss / b of its own at each joint. In the others it is a gear's, that turns with the velocity alone.
+Of four recordings two have MuJoCo's `frictionloss` as a model has it by default: a soft constraint whose torque is -loss * clip((a + b v) /
+(R loss)), with b = 2 / (0.95 * 0.02 s) by solref and solimp. It turns as the sign of v + a / b does: 9.5 ms before the velocity, and over a
+width of R loss / b of its own at each joint. In one of these the arm is simulated forward: a controller of positions (8 Hz, damping 0.8,
+torques of the rigid arm, none against friction) drives it 1000 times a second, joints stick at rest and where they turn, and the torque
+commanded in a step is logged with the position at its beginning. In all others torques are those of mj_inverse along the planned motion, and
+in two of four dry friction is a gear's, that turns with the velocity alone.
 """
 
 import argparse
@@ -34,7 +37,9 @@ ARMS = {
 }
 CAUSES = ["rotor_inertia", "cable_stiffness", "link_mass", "link_com", "payload_error", "gravity_direction", "contact", "torque_constant",
           "current_offset", "current_latency", "torque_ripple", "warmup_friction"]
-FINE = 500  # Hz of the simulation.
+FINE = 500  # Hz of the motion.
+SUBSTEPS = 2  # Of the forward simulation in a step of the motion.
+PACE = 2 * np.pi * 8  # rad/s, of the controller.
 
 
 def rod(mass, span):
@@ -201,6 +206,44 @@ def torques(model, arm, motion, told, begin, friction):
     if "warm" in told:
         share, lasts = told["warm"]
         out[:, joint] += share * np.exp(-t / lasts) * (friction[0][joint] * v[:, joint] + dry[:, joint])
+    return logged(out, q, told)
+
+
+def driven(model, arm, motion, told, begin, friction):
+    """Torques that a controller commands, and where the arm then is."""
+    q, v, a = motion
+    model.opt.timestep = 1 / (FINE * SUBSTEPS)
+    data, joint, last = mujoco.MjData(model), told["joint"], model.nbody - 1
+    data.qpos[:], data.qvel[:] = q[0], v[0]
+    out, where, mass, loss = np.zeros_like(q), np.zeros_like(q), np.zeros((model.nv, model.nv)), model.dof_frictionloss.copy()
+    jac = np.zeros((3, model.nv))
+    for step in range(len(q) * SUBSTEPS):
+        row, share = divmod(step, SUBSTEPS)
+        now, after = [part[row] for part in motion], [part[min(row + 1, len(q) - 1)] for part in motion]
+        aim, speed, pull = [one + (other - one) * share / SUBSTEPS for one, other in zip(now, after)]
+        time = begin + step * model.opt.timestep
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, mass)
+        wanted = pull + PACE**2 * (aim - data.qpos) + 1.6 * PACE * (speed - data.qvel)
+        command = mass @ wanted + data.qfrc_bias
+        if share == 0:
+            out[row], where[row] = command, data.qpos
+        data.qfrc_applied[:] = command
+        if "warm" in told:
+            more = told["warm"][0] * np.exp(-time / told["warm"][1])
+            model.dof_frictionloss[joint] = (1 + more) * loss[joint]
+            data.qfrc_applied[joint] -= more * friction[0][joint] * data.qvel[joint]
+        if "force" in told and told["start"] < time < told["end"]:
+            at = data.xpos[last] + data.xmat[last].reshape(3, 3) @ (arm["tool"] - arm["points"][-1])
+            mujoco.mj_jac(model, data, jac, None, at, last)
+            data.qfrc_applied += jac.T @ told["force"] * np.sin(np.pi * (time - told["start"]) / (told["end"] - told["start"]))
+        mujoco.mj_step(model, data)
+    return where, logged(out, where, told)
+
+
+def logged(out, q, told):
+    """Torques as the drives log them."""
+    joint = told["joint"]
     if "ripple" in told:
         size, order, phase = told["ripple"]
         out[:, joint] += size * np.sin(order * q[:, joint] + phase)
@@ -227,21 +270,28 @@ def case(folder, number, seed):
     mass, centre = 1 + scatter(0.01, n), scatter(0.004, (n, 3))
     friction = (peak * rng.uniform(0.04, 0.1, n), peak * rng.uniform(0.05, 0.12, n))
 
-    def clean(own, beside):
-        """Torques of the fitted and of the judging motions without noise."""
+    def built(own, beside):
+        """MuJoCo's model of an arm, with what no user knows of it."""
         own = {**own, "masses": own["masses"] * mass, "centres": own["centres"] + centre}
         loss = friction[1] if soft else nothing
-        model = model_of(own, friction[0], loss, beside.get("armature", nothing), beside.get("stiffness", nothing), beside.get("springref", 0.0))
-        begins = np.cumsum([0.0] + [len(q) / FINE + 2.0 for q, _, _ in motions])
-        return [torques(model, own, motion, beside, begin, friction) for motion, begin in zip(motions, begins)]
+        return model_of(own, friction[0], loss, beside.get("armature", nothing), beside.get("stiffness", nothing), beside.get("springref", 0.0))
 
-    torque = clean(real, told)
+    begins = np.cumsum([0.0] + [len(q) / FINE + 2.0 for q, _, _ in motions])
+
+    def clean(own, beside, by, count):
+        """What `by` makes of motions, without noise."""
+        return [by(built(own, beside), own, motion, beside, begin, friction) for motion, begin in zip(motions[:count], begins)]
+
+    if number % 4 == 1:
+        places, torque = zip(*clean(real, told, driven, 4))
+    else:
+        places, torque = [q for q, _, _ in motions], clean(real, told, torques, 4)
     ratio, constant = np.full(n, 100.0), np.maximum(peak / 100.0 / 8.0, 1e-3)
     encoder, every = 360.0 / 2**18, FINE // rate
     noise = 0.02 * peak
     lines = ["time_s,traj,use," + ",".join(f"q{j + 1}_deg" for j in range(n)) + "," + ",".join(f"i{j + 1}_a" for j in range(n))]
     begin = 0.0
-    for stretch, (q, _, _) in enumerate(motions):
+    for stretch, q in enumerate(places):
         for row in range(0, len(q), every):
             angle = np.round(np.degrees(q[row]) / encoder) * encoder
             current = (torque[stretch][row] + noise * rng.normal(size=n)) / (ratio * constant)
@@ -258,16 +308,16 @@ def case(folder, number, seed):
     effects = [{"effect": f, "where": f"joint {j + 1}", "hidden": False} for j in range(n) for f in ("viscous_friction", "coulomb_friction")]
     if cause:
         numbers = {k: (np.array(v).tolist()) for k, v in told.items() if k in ("start", "end", "mass", "gain", "offset", "late")}
-        without = clean(arm, {"joint": told["joint"]})
-        effect = np.vstack([a - b for a, b in zip(torque[:2], without[:2])])
+        with_it = clean(real, told, torques, 2)
+        effect = np.vstack(with_it) - np.vstack(clean(arm, {"joint": told["joint"]}, torques, 2))
         fitted = [np.vstack([motion[k] for motion in motions[:2]]) for k in range(3)]
-        seen = visible(effect, np.vstack(torque[:2]), fitted, arm, noise / np.sqrt(STEP * rate / FINE), lambda own: model_of(own, *4 * [nothing], 0.0))
+        seen = visible(effect, np.vstack(with_it), fitted, arm, noise / np.sqrt(STEP * rate / FINE), lambda own: model_of(own, *4 * [nothing], 0.0))
         effects.insert(0, {"effect": cause, "where": told["place"], "hidden": True, **seen, **numbers})
     where = folder / f"mujoco_{number:03}"
     where.mkdir(parents=True, exist_ok=True)
     (where / "robot.json").write_text(json.dumps(robot, indent=1) + "\n")
     (where / "recording.csv").write_text("\n".join(lines) + "\n")
-    (where / "want.json").write_text(json.dumps({"rate": rate, "frictionloss": soft, "effects": effects}, indent=1) + "\n")
+    (where / "want.json").write_text(json.dumps({"rate": rate, "friction": ["frictionloss", "frictionloss, driven", "gear", "gear"][number % 4], "effects": effects}, indent=1) + "\n")
 
 
 def main():

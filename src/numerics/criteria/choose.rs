@@ -1,6 +1,6 @@
 //! Poses that are proposed.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

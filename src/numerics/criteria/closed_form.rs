@@ -1,6 +1,6 @@
 //! Formulas that are proposed for what has no name.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

@@ -1,6 +1,6 @@
 //! How explanations are judged by folds.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

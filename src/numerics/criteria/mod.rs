@@ -24,9 +24,9 @@ pub mod search;
 pub mod setup;
 pub mod words;
 
-pub use criterion::Criterion;
+pub use criterion::CriterionValue;
 #[cfg(feature = "ablate")]
-pub use scaled::{Factor, Scaled};
+pub use scaled::{CriterionFactor, Scaled};
 pub use table::CriterionRow;
 
 /// All tables.
@@ -51,8 +51,8 @@ pub fn reached() -> Vec<String> {
 
 /// Scales one criterion (`room::NAME`) and leaves all others as they are; `false` where there is none of that name.
 #[cfg(feature = "ablate")]
-pub fn scale(name: &str, factor: Factor) -> bool {
-    all().for_each(|(_, criterion)| criterion.scale(Factor::One));
+pub fn scale(name: &str, factor: CriterionFactor) -> bool {
+    all().for_each(|(_, criterion)| criterion.scale(CriterionFactor::One));
     all().find(|(own, _)| *own == name).is_some_and(|(_, criterion)| {
         criterion.scale(factor);
         true

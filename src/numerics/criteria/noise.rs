@@ -1,6 +1,6 @@
 //! What is noise: repeats, stated sigma, autocorrelation, sizes that causes share.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

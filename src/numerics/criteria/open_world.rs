@@ -1,6 +1,6 @@
 //! Names against free forms: lengths, prices, when a name falls.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

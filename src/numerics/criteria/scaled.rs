@@ -1,15 +1,52 @@
 //! Half and double of what a criterion may be.
 
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
 /// What a criterion is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Factor {
+pub enum CriterionFactor {
     /// As it is.
     One = 0,
     /// Halved.
     Half = 1,
     /// Doubled.
     Double = 2,
+}
+
+/// How a criterion is scaled, and whether something came by.
+pub(super) struct Scaling<T: 'static> {
+    half: OnceLock<T>,
+    double: OnceLock<T>,
+    factor: AtomicU8,
+    reached: AtomicBool,
+}
+
+impl<T> Scaling<T> {
+    pub(super) const fn new() -> Self {
+        Self { half: OnceLock::new(), double: OnceLock::new(), factor: AtomicU8::new(0), reached: AtomicBool::new(false) }
+    }
+
+    pub(super) fn scale(&self, factor: CriterionFactor) {
+        self.factor.store(factor as u8, Ordering::Relaxed);
+    }
+
+    pub(super) fn was_reached(&self) -> bool {
+        self.reached.swap(false, Ordering::Relaxed)
+    }
+}
+
+impl<T: Scaled> Scaling<T> {
+    /// What stands for a value now.
+    pub(super) fn of<'v>(&'v self, value: &'v T) -> &'v T {
+        self.reached.store(true, Ordering::Relaxed);
+        match self.factor.load(Ordering::Relaxed) {
+            0 => value,
+            1 => self.half.get_or_init(|| value.scaled(0.5)),
+            _ => self.double.get_or_init(|| value.scaled(2.0)),
+        }
+    }
 }
 
 /// What can be halved and doubled.

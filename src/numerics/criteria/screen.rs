@@ -1,6 +1,6 @@
 //! Rows that no smooth model can follow.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

@@ -1,6 +1,6 @@
 //! How causes are searched: the criterion, the gate, what is refined.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

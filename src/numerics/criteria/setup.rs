@@ -1,6 +1,6 @@
 //! Set-up errors: what is wrong between files and robot file before any physics.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

@@ -25,10 +25,10 @@ macro_rules! criteria {
         $(
             $(#[doc = $doc])+
             #[cfg(not(feature = "ablate"))]
-            pub const $name: Criterion<$kind> = Criterion::new($value);
+            pub const $name: CriterionValue<$kind> = CriterionValue::new($value);
             $(#[doc = $doc])+
             #[cfg(feature = "ablate")]
-            pub static $name: Criterion<$kind> = Criterion::new($value);
+            pub static $name: CriterionValue<$kind> = CriterionValue::new($value);
         )+
 
         /// The rows of the table.

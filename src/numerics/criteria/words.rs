@@ -1,6 +1,6 @@
 //! What is said: verdicts, names, probabilities, what is worth a word.
 
-use super::Criterion;
+use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {

@@ -2,7 +2,7 @@
 
 use super::pool::{Conditional, HypothesisSet};
 use super::types::{ExplainedShare, Located, SpectrumLine};
-use crate::effect::{Basis, Clock, Effect, Form, Survey, Variable};
+use crate::effect::{Basis, Clock, Form, Survey, Variable};
 use std::collections::BTreeMap;
 
 /// The residual beside the causes of `given`.

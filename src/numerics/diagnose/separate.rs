@@ -82,7 +82,7 @@ fn best(pool: &CachedHypotheses, first: usize) -> Option<(f64, usize)> {
 fn rivals(survey: &Survey, model: &Model, (effect, place): (&str, Place), finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
     // What is called by its shape alone.
     let named = |form: &Form| form.name() == effect || form.is(&Unknown) && form.called(&[], survey) == effect;
-    let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| Some(other.form()?.as_a::<DeclaredForm>()?.declared());
+    let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| Some(other.form()?.declared()?.declaration());
     let mut own: Vec<&'static DeclaredCause> = model.stack.effects().filter_map(declared).collect();
     own.dedup_by_key(|cause| cause.name());
     let own = own.into_iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey));

@@ -90,7 +90,7 @@ pub(super) fn record_at(real: &DynamicArm, rate: f64, latency: f64, extra: &dyn 
 }
 
 /// Names with places, sorted.
-fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
+pub(super) fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
     let mut names: Vec<String> = diagnosis.findings.iter().map(|f| format!("{} {}", f.effect, f.place)).collect();
     names.sort();
     names

@@ -7,6 +7,8 @@ mod bootstrap;
 mod bridge;
 #[cfg(test)]
 mod cases;
+#[cfg(test)]
+mod cases_shapes;
 mod cause;
 mod changes;
 mod check;

@@ -73,10 +73,19 @@ impl FrictionFit {
             let velocity = problem.reduction.reduce(&mut problem.scene.velocity[joint].clone(), &mut room);
             let velocity = rows.iter().map(|row| velocity[*row]).collect();
             let columns: Vec<Vec<f64>> = inertial.into_iter().chain([velocity, vec![1.0; rows.len()]]).collect();
-            JointFit::new(&columns, rows.iter().map(|row| problem.measured[joint][*row]))
+            JointFit::new(&columns)
         };
         let joints = problem.base_courses(&rows).into_iter().enumerate().map(|one| of(one)).collect();
-        Self { rows, joints }
+        let mut fit = Self { rows, joints };
+        fit.take(&problem.measured);
+        fit
+    }
+
+    /// Takes measured minus rigid torques, `[joint][judged row]`.
+    pub fn take(&mut self, measured: &[Vec<f64>]) {
+        for (fit, course) in self.joints.iter_mut().zip(measured) {
+            fit.left = fit.apart(&DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| course[*row])));
+        }
     }
 
     /// Number of rows.
@@ -102,16 +111,14 @@ impl FrictionFit {
 }
 
 impl JointFit {
-    fn new(columns: &[Vec<f64>], measured: impl Iterator<Item = f64>) -> Self {
+    fn new(columns: &[Vec<f64>]) -> Self {
         let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt() + 1e-12;
         let rows = columns.last().map_or(0, Vec::len);
         let scales: Vec<f64> = columns.iter().map(|column| norm(column)).collect();
         let columns = DMatrix::from_fn(rows, columns.len(), |row, column| columns[column][row] / scales[column]);
         let mut gram = columns.tr_mul(&columns);
         (0..gram.nrows()).for_each(|k| gram[(k, k)] += RIDGE);
-        let mut fit = Self { factor: gram.cholesky(), columns, left: DVector::zeros(0) };
-        fit.left = fit.apart(&DVector::from_iterator(rows, measured));
-        fit
+        Self { factor: gram.cholesky(), columns, left: DVector::zeros(rows) }
     }
 
     /// What the columns leave of a course.

@@ -26,7 +26,7 @@ const NAMELESS: usize = 4;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
-const CLOCK_ROUNDS: usize = 3;
+const CLOCK_ROUNDS: usize = 4;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {

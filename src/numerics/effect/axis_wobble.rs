@@ -1,11 +1,11 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
-use crate::criteria::effect::{RARE, WOBBLES};
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
     Variable, names,
 };
+use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 

@@ -2,8 +2,7 @@
 
 use super::basis::around;
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
-    names,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
 };
 use crate::criteria::effect::{BENDS, RARE};
 use crate::robot::RobotModel;
@@ -147,8 +146,8 @@ impl Cause for Backlash {
         format!("{place} has lost motion: a half-gap of {} {by}", summary.size())
     }
 
-    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        let law = form.term()?.law();
+    fn impossible(&self, term: &Term, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let law = term.law();
         if let Variable::Push { joint, friction_nm } = law.first.of {
             let most = survey.recorded_load(joint);
             let [friction, largest] = [friction_nm.abs(), most].map(|torque| figure(torque, 0));

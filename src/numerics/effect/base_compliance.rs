@@ -1,9 +1,7 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
-use super::form::parameters;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
 };
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -13,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub struct BaseCompliance;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TiltingBase {
     /// Two stiffnesses instead of one.
     two: bool,
@@ -54,14 +52,22 @@ impl Cause for BaseCompliance {
     }
 }
 
-impl Effect for TiltingBase {
-    fn name(&self) -> &'static str {
-        BaseCompliance.about().name
+impl Placed for TiltingBase {
+    fn place(&self) -> Place {
+        Place::Base
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let unit = Unit::RadianPerNewtonMetre;
-        if self.two { parameters(self, [("x", unit, 1e-3), ("y", unit, 1e-3)]) } else { parameters(self, [("", unit, 1e-3)]) }
+    fn cause(&self) -> &'static dyn Cause {
+        &BaseCompliance
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let names: &[&str] = if self.two { &["x", "y"] } else { &[""] };
+        names.iter().map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3)).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -80,20 +86,6 @@ impl Effect for TiltingBase {
 
     fn needs_torque(&self) -> bool {
         true
-    }
-}
-
-impl Placed for TiltingBase {
-    fn place(&self) -> Place {
-        Place::Base
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &BaseCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
     }
 
     fn body(&self) -> serde_json::Value {

@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, names};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
@@ -36,10 +36,6 @@ impl Cause for CableDrag {
 
     fn absorbs_residual(&self) -> &'static [&'static str] {
         FINER
-    }
-
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        Spring::identities(form)
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -118,8 +118,8 @@ pub trait Cause: Sync {
         None
     }
 
-    /// Other causes that do the same as a form of this one, named `called`, in whatever data: identities of kinematics and statics.
-    fn identities(&self, _form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+    /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
+    fn identities(&self, _term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
     }
 
@@ -148,9 +148,9 @@ pub trait Cause: Sync {
         String::new()
     }
 
-    /// Why a form with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the
+    /// Why a term with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the
     /// recording holds. Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
-    fn impossible(&self, _form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+    fn impossible(&self, _term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         None
     }
 

@@ -3,7 +3,7 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, names};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
 
 pub struct Counterbalance;
 
@@ -32,12 +32,6 @@ impl Cause for Counterbalance {
     }
 
     /// The torque of a link about its own joint is of first order in that joint's angle, as a balancer's; a hose pulls by it too.
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        let mut out = vec![(names::CABLE_DRAG, form.place())];
-        out.extend(Spring::identities(form));
-        out
-    }
-
     fn measure(&self) -> Option<Measure> {
         Some(MEASURE)
     }

@@ -2,24 +2,49 @@
 //!
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
-use super::{ArmState, Cause, DeclaredForm, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
+use super::{
+    ArmState, Cause, DeclaredForm, Deflection, Effect, NumberSpec, ParameterEstimate, ParameterSpec, Place, Survey, Term,
+    Variable, cause,
+};
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// An effect with a place. Most are a [`Term`]; what is no product of laws at a place implements this by hand.
-pub trait Placed: Effect + Any {
+/// What a [`Form`] holds: a law at a place ([`Term`]), one that a user declared ([`DeclaredForm`]), or a motion with physics of its own and
+/// what it changes about the load. It is all that has to be written of such a motion.
+pub trait Placed: Send + Sync {
     /// The cause that proposed it.
     fn cause(&self) -> &'static dyn Cause;
     /// Where it acts.
     fn place(&self) -> Place;
     /// What it depends on.
     fn variables(&self) -> Vec<Variable>;
-    /// Its place and shape as JSON, as [`Cause::read`] reads it.
+    /// Its coefficients, in the order of `p`.
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec>;
+    /// See [`Effect::deflect`].
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
+    /// Its place and shape as JSON, as [`Cause::read`] reads it: what tells it from others of its cause.
     fn body(&self) -> serde_json::Value;
+    /// See [`Effect::needs_torque`].
+    fn needs_torque(&self) -> bool {
+        false
+    }
+    /// See [`Effect::needs_current`]; a law of a motor current needs it in any case.
+    fn needs_current(&self) -> bool {
+        false
+    }
+    /// See [`Effect::needs_sight`].
+    fn needs_sight(&self) -> bool {
+        false
+    }
+    /// See [`Effect::load_correction`].
+    fn load_correction(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut LoadCorrection) {}
+    /// See [`Effect::missing`].
+    fn missing(&self, _robot: &RobotModel, _data: &Measurements) -> Option<String> {
+        None
+    }
     /// Forms like this one with other shapes around its own, closer with every level and within bounds; empty where there is nothing
     /// to refine.
     fn near(&self, _survey: &Survey, _level: i32) -> Vec<Form> {
@@ -31,7 +56,19 @@ pub trait Placed: Effect + Any {
     }
     /// What it is called with fitted coefficients `p` (SI): another cause's name where they are that cause's in another form.
     fn called(&self, _p: &[f64], _survey: &Survey) -> &'static str {
-        self.name()
+        self.cause().name()
+    }
+    /// Why coefficients `p` (SI) cannot be its cause's, as a clause: see [`Cause::impossible`].
+    fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+        None
+    }
+    /// Other causes that do the same under the name `called`, in whatever data: see [`Cause::identities`].
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        Vec::new()
+    }
+    /// Its shape or size in words, where its cause tells it to people.
+    fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {
+        None
     }
     /// Which of its parameters are the numbers of a free curve.
     fn free_curve(&self) -> std::ops::Range<usize> {
@@ -54,6 +91,10 @@ pub trait Placed: Effect + Any {
     fn term(&self) -> Option<&Term> {
         None
     }
+    /// The declared law, where it is one.
+    fn declared(&self) -> Option<&DeclaredForm> {
+        None
+    }
     /// Its shape numbers by their names, where they have names.
     fn shape_numbers(&self) -> Vec<(String, f64)> {
         Vec::new()
@@ -74,25 +115,25 @@ pub trait Placed: Effect + Any {
 
 /// A form of any cause.
 #[derive(Clone)]
-pub struct Form {
-    inner: Arc<dyn Placed>,
-    same: fn(&dyn Placed, &dyn Placed) -> bool,
-}
+pub struct Form(Arc<dyn Placed>);
 
-fn same<T: Placed + PartialEq>(a: &dyn Placed, b: &dyn Placed) -> bool {
-    let (a, b): (&dyn Any, &dyn Any) = (a, b);
-    a.downcast_ref::<T>().is_some_and(|a| b.downcast_ref::<T>() == Some(a))
-}
-
-impl<T: Placed + PartialEq> From<T> for Form {
+impl<T: Placed + 'static> From<T> for Form {
     fn from(form: T) -> Self {
-        Self { inner: Arc::new(form), same: same::<T> }
+        Self(Arc::new(form))
     }
 }
 
 impl PartialEq for Form {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.inner, &other.inner) || (self.same)(&*self.inner, &*other.inner)
+        if Arc::ptr_eq(&self.0, &other.0) {
+            return true;
+        }
+        match ((self.term(), other.term()), (self.declared(), other.declared())) {
+            ((None, None), (None, None)) => {
+                self.name() == other.name() && self.place() == other.place() && self.body() == other.body()
+            }
+            (terms, declared) => terms.0 == terms.1 && declared.0 == declared.1,
+        }
     }
 }
 
@@ -106,20 +147,32 @@ impl std::ops::Deref for Form {
     type Target = dyn Placed;
 
     fn deref(&self) -> &Self::Target {
-        &*self.inner
+        &*self.0
     }
 }
 
 impl Form {
+    /// The name of its cause.
+    pub fn name(&self) -> &'static str {
+        self.cause().name()
+    }
+
+    /// Its coefficients as parameters: `cause.place.number`.
+    pub fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let (name, place, variant) = (self.name(), self.place(), self.variant());
+        let middle = if variant.is_empty() { place.tag() } else { format!("{}.{variant}", place.tag()) };
+        let spec = |(number, unit, prior_sigma): NumberSpec| ParameterSpec {
+            name: if number.is_empty() { format!("{name}.{middle}") } else { format!("{name}.{middle}.{number}") },
+            place,
+            unit,
+            prior_sigma,
+        };
+        self.numbers(robot).into_iter().map(spec).collect()
+    }
+
     /// Effect, place and variant: see [`Placed::variant`].
     pub fn key(&self) -> String {
         format!("{}@{}#{}", self.name(), self.place(), self.variant())
-    }
-
-    /// As a form of one type.
-    pub fn as_a<T: Placed>(&self) -> Option<&T> {
-        let inner: &dyn Any = &*self.inner;
-        inner.downcast_ref()
     }
 
     /// Whether it is of a cause.
@@ -156,49 +209,30 @@ impl<'de> Deserialize<'de> for Form {
 
 impl Effect for Form {
     fn name(&self) -> &'static str {
-        self.inner.name()
+        Self::name(self)
     }
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        self.inner.parameters(robot)
+        Self::parameters(self, robot)
     }
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        self.inner.deflect(robot, state, p, out);
+        self.0.deflect(robot, state, p, out);
     }
     fn needs_torque(&self) -> bool {
-        self.inner.needs_torque()
+        self.0.needs_torque()
     }
     fn needs_current(&self) -> bool {
-        self.inner.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
+        self.0.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
     }
     fn needs_sight(&self) -> bool {
-        self.inner.needs_sight()
+        self.0.needs_sight()
     }
     fn load_correction(&self, q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
-        self.inner.load_correction(q, payload, p, out);
+        self.0.load_correction(q, payload, p, out);
     }
     fn form(&self) -> Option<&Form> {
         Some(self)
     }
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
-        self.inner.missing(robot, data)
+        self.0.missing(robot, data)
     }
-}
-
-/// Parameters of a placed effect: `effect.tag.number`.
-pub(super) fn parameters<'a>(
-    form: &impl Placed,
-    numbers: impl IntoIterator<Item = (&'a str, crate::units::Unit, f64)>,
-) -> Vec<ParameterSpec> {
-    let (name, place) = (form.name(), form.place());
-    let variant = form.variant();
-    let middle = if variant.is_empty() { place.tag() } else { format!("{}.{variant}", place.tag()) };
-    numbers
-        .into_iter()
-        .map(|(number, unit, prior_sigma)| ParameterSpec {
-            name: if number.is_empty() { format!("{name}.{middle}") } else { format!("{name}.{middle}.{number}") },
-            place,
-            unit,
-            prior_sigma,
-        })
-        .collect()
 }

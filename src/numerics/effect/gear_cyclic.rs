@@ -1,10 +1,9 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::joint_table::strongest_orders;
+use super::joint_table::{strongest_orders};
 use super::summary::amplitude;
-use super::unweighed_windup::UnweighedWindup;
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
     Variable, names, orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
@@ -67,7 +66,7 @@ impl Cause for GearCyclic {
     fn sentence(&self, summary: &Summary) -> String {
         let mut orders: Vec<String> =
             summary.estimates(names::GEAR_CYCLIC).map(|(term, numbers)| order(term, &numbers)).collect();
-        let weight = summary.form::<UnweighedWindup>().map(|windup| windup.largest(summary));
+        let weight = summary.words(names::JOINT_COMPLIANCE);
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(names::JOINT_TABLE).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
@@ -81,9 +80,9 @@ impl Cause for GearCyclic {
         &[names::UNKNOWN]
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        let first = form.term().is_some_and(|term| matches!(term.basis(), Basis::Wave { order: 1, .. }));
-        if first { vec![(names::COUNTERBALANCE, form.place())] } else { Vec::new() }
+    fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
+        let first = matches!(term.basis(), Basis::Wave { order: 1, .. });
+        if first { vec![(names::COUNTERBALANCE, term.motion().place())] } else { Vec::new() }
     }
 }
 

@@ -5,8 +5,8 @@
 
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, ParameterSpec, Place, Placed,
-    Summary, Survey, Variable, names,
+    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
+    Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -27,26 +27,28 @@ impl Cause for JointCompliance {
     }
 
     fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Windup::new(setting.load)))
+        Some(Box::new(Windups(setting.load)))
     }
 
     /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup::of(joint, Load::GravityTorque), 1).positive());
+        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup { joint, load: Load::GravityTorque }, 1).positive());
         let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
         // The sign of a current is the controller's.
         let currents = survey.revolute().filter(|_| by_current);
-        let currents = currents.map(|joint| Hypothesis::new(Windup::of(joint, Load::MotorCurrent), 2));
+        let currents = currents.map(|joint| Hypothesis::new(Windup { joint, load: Load::MotorCurrent }, 2));
         by_gravity.chain(currents).chain(UnweighedWindup::propose(&Self, survey)).collect()
     }
 
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
-        let Some(weight) = UnweighedWindup::size(summary) else {
+        let Some(largest) = summary.words(names::JOINT_COMPLIANCE) else {
             return format!("{place} winds up under its load by {}", summary.value());
         };
-        match summary.of_form::<Windup>().next() {
+        let weight = format!("by up to {largest} arcsec where its links stretch out level");
+        // By a stiffness of its own.
+        match summary.wordless(names::JOINT_COMPLIANCE).first() {
             Some(own) => format!(
                 "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
                 own.value, own.unit
@@ -66,69 +68,42 @@ impl Cause for JointCompliance {
         UnweighedWindup::read(&Self, body).or_else(|| Some(Windup::deserialize(body).map(Form::from)))
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        UnweighedWindup::identities(form)
-    }
-
     fn yields_to_torque(&self) -> bool {
         true
     }
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Of one joint.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Windup {
     load: Load,
-    /// One joint (from 0), or all that turn.
-    joint: Option<usize>,
+    /// From 0.
+    joint: usize,
 }
 
-impl Windup {
-    /// Of every joint that turns.
-    pub fn new(load: Load) -> Self {
-        Self { load, joint: None }
+impl Placed for Windup {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint)
     }
 
-    /// Of one joint, from 0.
-    pub fn of(joint: usize, load: Load) -> Self {
-        Self { load, joint: Some(joint) }
+    fn cause(&self) -> &'static dyn Cause {
+        &JointCompliance
     }
 
-    fn joints(&self, robot: &RobotModel) -> impl Iterator<Item = usize> {
-        let one = self.joint;
-        (0..robot.joints()).filter(move |j| one.is_none_or(|joint| joint == *j)).filter(|j| robot.is_revolute(*j))
-    }
-}
-
-impl Effect for Windup {
-    fn name(&self) -> &'static str {
-        names::JOINT_COMPLIANCE
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.joint }]
     }
 
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let unit = self.load.unit_of_compliance();
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let prior_sigma = match self.load {
             Load::GravityTorque => 1e-3,
             Load::MotorCurrent => 1e-2,
         };
-        self.joints(robot)
-            .map(|j| ParameterSpec { name: format!("joint_compliance.j{}", j + 1), place: Place::Joint(j), unit, prior_sigma })
-            .collect()
+        vec![(String::new(), self.load.unit_of_compliance(), prior_sigma)]
     }
 
-    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        for (parameter, joint) in self.joints(robot).enumerate() {
-            let load = match self.load {
-                Load::GravityTorque => state.torque()[joint],
-                Load::MotorCurrent => match state.current().map(|all| all[joint]) {
-                    Some(current) if current.is_finite() => current,
-                    _ => 0.0,
-                },
-            };
-            out.turn(parameter, p, joint, load);
-            if self.load == Load::GravityTorque {
-                out.yields(joint, p[parameter]);
-            }
-        }
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        self.wind_up(0, state, p, out);
     }
 
     fn needs_torque(&self) -> bool {
@@ -148,26 +123,65 @@ impl Effect for Windup {
             _ => None,
         }
     }
-}
-
-impl Placed for Windup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint.unwrap_or(0))
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint.unwrap_or(0) }]
-    }
 
     fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
-        Some((self.joint?, *p.first()?))
+        Some((self.joint, *p.first()?))
     }
 
     fn body(&self) -> serde_json::Value {
         serde_json::json!(self)
+    }
+}
+
+impl Windup {
+    /// Adds the turn of its joint by coefficient number `parameter` of `p`.
+    fn wind_up(&self, parameter: usize, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let load = match self.load {
+            Load::GravityTorque => state.torque()[self.joint],
+            Load::MotorCurrent => match state.current().map(|all| all[self.joint]) {
+                Some(current) if current.is_finite() => current,
+                _ => 0.0,
+            },
+        };
+        out.turn(parameter, p, self.joint, load);
+        if self.load == Load::GravityTorque {
+            out.yields(self.joint, p[parameter]);
+        }
+    }
+}
+
+/// Of every joint that turns.
+struct Windups(Load);
+
+impl Windups {
+    fn each(&self, robot: &RobotModel) -> impl Iterator<Item = Windup> {
+        let load = self.0;
+        (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).map(move |joint| Windup { load, joint })
+    }
+}
+
+impl Effect for Windups {
+    fn name(&self) -> &'static str {
+        names::JOINT_COMPLIANCE
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        self.each(robot).flat_map(|windup| Form::from(windup).parameters(robot)).collect()
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        self.each(robot).enumerate().for_each(|(parameter, windup)| windup.wind_up(parameter, state, p, out));
+    }
+
+    fn needs_torque(&self) -> bool {
+        self.0 == Load::GravityTorque
+    }
+
+    fn needs_current(&self) -> bool {
+        self.0 == Load::MotorCurrent
+    }
+
+    fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
+        Windup { load: self.0, joint: 0 }.missing(robot, data)
     }
 }

@@ -1,10 +1,9 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
-use super::form::parameters;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, NamedForms, ParameterSpec, Place, Placed,
-    Summary, Survey, Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec,
+    ParameterEstimate, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -31,7 +30,7 @@ pub enum HardeningLaw {
     Curve { most_nm: f64 },
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BentWindup {
     joint: usize,
     law: HardeningLaw,
@@ -83,13 +82,7 @@ impl Cause for JointHardening {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let shape = match summary.form::<BentWindup>().map(|windup| windup.law) {
-            Some(HardeningLaw::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
-            Some(HardeningLaw::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
-            Some(HardeningLaw::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
-            Some(HardeningLaw::Power { exponent, .. }) => format!("it grows by the load to the power of {}", figure(exponent, 1)),
-            _ => "its shape is a free curve of the load".to_string(),
-        };
+        let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
@@ -104,21 +97,6 @@ impl Cause for JointHardening {
 
     fn simpler(&self) -> Option<&'static str> {
         Some(names::JOINT_COMPLIANCE)
-    }
-
-    fn impossible(&self, form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        let windup: &BentWindup = form.as_a()?;
-        let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = windup.law
-        else {
-            return None;
-        };
-        let most = survey.recorded_load(windup.joint);
-        let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
-        (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
-    }
-
-    fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
-        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, form.place())] } else { Vec::new() }
     }
 
     /// From a wind-up in proportion.
@@ -185,21 +163,26 @@ impl BentWindup {
     }
 }
 
-impl Effect for BentWindup {
-    fn name(&self) -> &'static str {
-        names::JOINT_HARDENING
+impl Placed for BentWindup {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint)
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let linear = ("linear", Unit::RadianPerNewtonMetre, 1e-3);
+    fn cause(&self) -> &'static dyn Cause {
+        &JointHardening
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.joint }]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];
         match self.law {
-            HardeningLaw::Curve { .. } => {
-                let names: Vec<String> = (1..=CURVE).map(|k| format!("sin{k}")).collect();
-                let curve = names.iter().map(|name| (name.as_str(), Unit::Radian, PLAUSIBLE));
-                parameters(self, std::iter::once(linear).chain(curve))
-            }
-            _ => parameters(self, [linear, ("bend", Unit::RadianPerNewtonMetre, 1e-3)]),
+            HardeningLaw::Curve { .. } => numbers.extend((1..=CURVE).map(|k| (format!("sin{k}"), Unit::Radian, PLAUSIBLE))),
+            _ => numbers.push(("bend".into(), Unit::RadianPerNewtonMetre, 1e-3)),
         }
+        numbers
     }
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -220,20 +203,6 @@ impl Effect for BentWindup {
 
     fn needs_torque(&self) -> bool {
         true
-    }
-}
-
-impl Placed for BentWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointHardening
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint }]
     }
 
     /// Both near no load and far out.
@@ -265,6 +234,30 @@ impl Placed for BentWindup {
 
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
         if self.is_lost_motion(p, survey.load(self.joint)) { names::BACKLASH } else { names::JOINT_HARDENING }
+    }
+
+    fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = self.law
+        else {
+            return None;
+        };
+        let most = survey.recorded_load(self.joint);
+        let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
+        (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
+    }
+
+    fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
+        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, self.place())] } else { Vec::new() }
+    }
+
+    fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {
+        match self.law {
+            HardeningLaw::Saturating { at_nm } => Some(format!("it stiffens above about {} Nm", figure(at_nm, 0))),
+            HardeningLaw::SoftZone { at_nm } => Some(format!("it is soft below about {} Nm", figure(at_nm, 0))),
+            HardeningLaw::Knee { at_nm } => Some(format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0))),
+            HardeningLaw::Power { exponent, .. } => Some(format!("it grows by the load to the power of {}", figure(exponent, 1))),
+            HardeningLaw::Curve { .. } => None,
+        }
     }
 
     fn body(&self) -> serde_json::Value {

@@ -1,10 +1,9 @@
 //! `joint_log_lag`: joints and points are not of one moment. Of standing points a share of the last move was still to come when the
 //! joints were logged, or, where a controller ends the moves of all joints together, a turn shared out as these moves are; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
-use super::form::parameters;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, HiddenSize, Hypothesis, NamedForms, ParameterSpec, Place,
-    Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary,
+    Survey, Variable, figure, names,
 };
 use crate::criteria::words::{CLOCKS, TRACE};
 use crate::robot::RobotModel;
@@ -27,7 +26,7 @@ enum Behind {
     Clock,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Lag {
     /// Whether each joint lags by a share of its own; else all by one.
     each: bool,
@@ -60,7 +59,7 @@ impl Cause for JointLogLag {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let clocks = summary.form::<Lag>().is_some_and(|lag| lag.by == Behind::Clock);
+        let clocks = summary.variables(names::JOINT_LOG_LAG).contains(&Variable::Speed);
         match summary.parameters.first() {
             Some(n) if clocks => {
                 let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
@@ -70,7 +69,8 @@ impl Cause for JointLogLag {
                      of their rows"
                 )
             }
-            Some(n) if summary.form::<Lag>().is_some_and(|lag| lag.by == Behind::Synchronous) => format!(
+            // A turn that is shared out, not shares of each turn.
+            Some(n) if n.unit == "arcsec" => format!(
                 "joints were logged before the arm had settled: the joint that moved most had {} arcsec still to come, the others their \
                  shares of it",
                 figure(n.value, 0)
@@ -102,13 +102,6 @@ impl Cause for JointLogLag {
         clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
     }
 
-    /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
-    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
-        let lag: &Lag = form.as_a()?;
-        let (most, share) = p.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        (lag.by != Behind::Clock && share < -error(most)).then(|| "a lag is not below zero".into())
-    }
-
     fn is_of_the_measurement(&self) -> bool {
         true
     }
@@ -119,34 +112,6 @@ impl Cause for JointLogLag {
 
     fn is_separable_by_poses(&self) -> bool {
         false
-    }
-}
-
-impl Effect for Lag {
-    fn name(&self) -> &'static str {
-        names::JOINT_LOG_LAG
-    }
-
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let names: Vec<String> = (1..=robot.joints()).map(|joint| format!("share_j{joint}")).collect();
-        match (self.by, self.each) {
-            (Behind::Clock, _) => parameters(self, [("time", Unit::Second, 0.01)]),
-            (Behind::Synchronous, _) => parameters(self, [("rest", Unit::Radian, 0.01)]),
-            (Behind::Move, true) => parameters(self, names.iter().map(|name| (name.as_str(), Unit::One, 0.1))),
-            (Behind::Move, false) => parameters(self, [("share", Unit::One, 0.1)]),
-        }
-    }
-
-    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let largest = if self.by == Behind::Synchronous { state.largest_turn(robot) } else { 0.0 };
-        for joint in 0..robot.joints() {
-            match self.by {
-                Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
-                Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),
-                Behind::Clock => out.turn(0, p, joint, state.velocity(joint)),
-                Behind::Move => out.turn(if self.each { joint } else { 0 }, p, joint, state.last_move(joint)),
-            }
-        }
     }
 }
 
@@ -161,6 +126,33 @@ impl Placed for Lag {
 
     fn variables(&self) -> Vec<Variable> {
         vec![if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }]
+    }
+
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
+        match (self.by, self.each) {
+            (Behind::Clock, _) => vec![("time".into(), Unit::Second, 0.01)],
+            (Behind::Synchronous, _) => vec![("rest".into(), Unit::Radian, 0.01)],
+            (Behind::Move, true) => (1..=robot.joints()).map(|joint| (format!("share_j{joint}"), Unit::One, 0.1)).collect(),
+            (Behind::Move, false) => vec![("share".into(), Unit::One, 0.1)],
+        }
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let largest = if self.by == Behind::Synchronous { state.largest_turn(robot) } else { 0.0 };
+        for joint in 0..robot.joints() {
+            match self.by {
+                Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
+                Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),
+                Behind::Clock => out.turn(0, p, joint, state.velocity(joint)),
+                Behind::Move => out.turn(if self.each { joint } else { 0 }, p, joint, state.last_move(joint)),
+            }
+        }
+    }
+
+    /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
+    fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+        let (most, share) = p.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        (self.by != Behind::Clock && share < -error(most)).then(|| "a lag is not below zero".into())
     }
 
     fn body(&self) -> serde_json::Value {

@@ -1,8 +1,8 @@
 //! `joint_warming`: a joint's zero, ratio or stiffness follows a temperature, the warm-up, or the heat of the joint's own work.
 
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
-    names, warmth,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
+    warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
@@ -86,8 +86,8 @@ impl Cause for JointWarming {
         .into()
     }
 
-    fn impossible(&self, form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        warmth::impossible(form.term()?, survey)
+    fn impossible(&self, term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        warmth::impossible(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -1,10 +1,8 @@
 //! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
 
-use super::form::parameters;
 use super::motion::{SHORT, extent};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
@@ -28,7 +26,7 @@ pub enum Bending {
     TwoDirections,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BentLink {
     /// From 0.
     link: usize,
@@ -39,10 +37,6 @@ pub struct BentLink {
 const WRIST: usize = 2;
 
 impl Cause for LinkCompliance {
-    fn stands_in_for_two(&self) -> bool {
-        true
-    }
-
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
             name: names::LINK_COMPLIANCE,
@@ -68,6 +62,10 @@ impl Cause for LinkCompliance {
             .collect()
     }
 
+    fn stands_in_for_two(&self) -> bool {
+        true
+    }
+
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} bends under what it carries by {}", summary.place, summary.value())
     }
@@ -77,17 +75,22 @@ impl Cause for LinkCompliance {
     }
 }
 
-impl Effect for BentLink {
-    fn name(&self) -> &'static str {
-        names::LINK_COMPLIANCE
+impl Placed for BentLink {
+    fn place(&self) -> Place {
+        Place::Links(self.link, self.link)
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let unit = Unit::RadianPerNewtonMetre;
-        match self.bending {
-            Bending::TwoDirections => parameters(self, [("first", unit, 1e-3), ("second", unit, 1e-3)]),
-            _ => parameters(self, [("", unit, 1e-3)]),
-        }
+    fn cause(&self) -> &'static dyn Cause {
+        &LinkCompliance
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let names: &[&str] = if self.bending == Bending::TwoDirections { &["first", "second"] } else { &[""] };
+        names.iter().map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3)).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -109,20 +112,6 @@ impl Effect for BentLink {
 
     fn needs_torque(&self) -> bool {
         true
-    }
-}
-
-impl Placed for BentLink {
-    fn place(&self) -> Place {
-        Place::Links(self.link, self.link)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &LinkCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
     }
 
     fn body(&self) -> serde_json::Value {

@@ -1,10 +1,9 @@
 //! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
-use super::form::parameters;
 use super::spring::{MEASURE, Spring};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
-    Survey, Variable, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
+    Variable, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -14,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub struct LinkMass;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct WrongLinkMass {
     /// From 0.
     link: usize,
@@ -48,13 +47,6 @@ impl Cause for LinkMass {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        match form.place() {
-            Place::Links(link, _) if Spring::balances(link) => vec![(names::COUNTERBALANCE, Place::Joint(link))],
-            _ => Vec::new(),
-        }
-    }
-
     fn measure(&self) -> Option<Measure> {
         Some(MEASURE)
     }
@@ -64,15 +56,23 @@ impl Cause for LinkMass {
     }
 }
 
-impl Effect for WrongLinkMass {
-    fn name(&self) -> &'static str {
-        LinkMass.about().name
+impl Placed for WrongLinkMass {
+    fn place(&self) -> Place {
+        Place::Links(self.link, self.link)
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let mass = ("mass", Unit::Kilogram, 1e4);
-        let moments = ["x", "y", "z"].map(|axis| (axis, Unit::KilogramMetre, 1e4));
-        if self.centre { parameters(self, std::iter::once(mass).chain(moments)) } else { parameters(self, [mass]) }
+    fn cause(&self) -> &'static dyn Cause {
+        &LinkMass
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let mass = ("mass".into(), Unit::Kilogram, 1e4);
+        let moments = ["x", "y", "z"].map(|axis| (axis.into(), Unit::KilogramMetre, 1e4));
+        std::iter::once(mass).chain(moments.into_iter().filter(|_| self.centre)).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
@@ -97,19 +97,9 @@ impl Effect for WrongLinkMass {
             out.body_moment[self.link] += Vector3::new(p[1], p[2], p[3]);
         }
     }
-}
 
-impl Placed for WrongLinkMass {
-    fn place(&self) -> Place {
-        Place::Links(self.link, self.link)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &LinkMass
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        if Spring::balances(self.link) { vec![(names::COUNTERBALANCE, Place::Joint(self.link))] } else { Vec::new() }
     }
 
     fn is_of_torque_model(&self) -> bool {

@@ -1,7 +1,9 @@
 //! The library of physical effects: each cause of error in a file of its own, one line each in [`CAUSES`].
 //!
-//! Most causes are laws at a place: effect = sum_k c_k * direction(place) * law_k(variables of the row), a [`Term`]. An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
-//! and compensation use the same effects through one composition, the [`EffectStack`].
+//! An [`Effect`] adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction and
+//! compensation use the same effects through one composition, the [`EffectStack`]. What a search may choose is a [`Form`]: most are laws at
+//! a place, effect = sum_k c_k * direction(place) * law_k(variables of the row), a [`Term`]; the others are motions with physics of their
+//! own. Both are [`Placed`], and that is all that a form has to be.
 
 mod anchor;
 mod axis_wobble;

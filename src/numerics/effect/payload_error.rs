@@ -1,10 +1,9 @@
 //! `payload_error`: the payload's mass (and first moment) differs from what was declared, where one is carried.
 
-use super::form::parameters;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
-    Survey, Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
+    Variable, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -14,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub struct PayloadError;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct WrongPayload {
     /// Whether the centre is wrong too.
     centre: bool,
@@ -52,7 +51,8 @@ impl Cause for PayloadError {
 
     fn sentence(&self, summary: &Summary) -> String {
         match summary.parameters.first() {
-            Some(n) if summary.form::<WrongPayload>().is_some_and(|form| form.tool) => {
+            // Of its forms a tool's mass alone loads an arm without a payload.
+            Some(n) if summary.variables(self.name()).contains(&Variable::ArmLoad) => {
                 let how = if n.value < 0.0 { "less" } else { "more" };
                 format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
             }
@@ -73,19 +73,27 @@ impl Cause for PayloadError {
     }
 }
 
-impl Effect for WrongPayload {
-    fn name(&self) -> &'static str {
-        PayloadError.about().name
+impl Placed for WrongPayload {
+    fn place(&self) -> Place {
+        Place::Tool
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &PayloadError
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![if self.tool { Variable::ArmLoad } else { Variable::Payload }]
     }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
         if self.tool {
-            return parameters(self, [("tool_mass", Unit::Kilogram, TOOL.max(robot.description().payload_mass))]);
+            return vec![("tool_mass".into(), Unit::Kilogram, TOOL.max(robot.description().payload_mass))];
         }
-        let mass = ("mass", Unit::One, 1.0);
-        let centre = ["x", "y", "z"].map(|axis| (axis, Unit::Millimetre, 1.0));
-        if self.centre { parameters(self, std::iter::once(mass).chain(centre)) } else { parameters(self, [mass]) }
+        let mass = ("mass".into(), Unit::One, 1.0);
+        let centre = ["x", "y", "z"].map(|axis| (axis.into(), Unit::Millimetre, 1.0));
+        std::iter::once(mass).chain(centre.into_iter().filter(|_| self.centre)).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
@@ -111,20 +119,6 @@ impl Effect for WrongPayload {
         if self.centre {
             out.payload_moment += Vector3::new(p[1], p[2], p[3]) * payload;
         }
-    }
-}
-
-impl Placed for WrongPayload {
-    fn place(&self) -> Place {
-        Place::Tool
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &PayloadError
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![if self.tool { Variable::ArmLoad } else { Variable::Payload }]
     }
 
     fn is_of_torque_model(&self) -> bool {

@@ -3,11 +3,8 @@
 //!
 //! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
 
-use super::form::parameters;
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::UNCOMMON;
-use super::{
-    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable, names,
-};
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -28,7 +25,7 @@ pub(super) struct Spring {
     shape: SpringShape,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct SpringShape {
     joint: usize,
     #[serde(default = "first")]
@@ -41,12 +38,6 @@ fn first() -> u32 {
 
 /// Orders of a spring that has a length at rest.
 const ORDERS: u32 = 2;
-
-impl PartialEq for Spring {
-    fn eq(&self, other: &Self) -> bool {
-        self.cause.name() == other.cause.name() && self.shape == other.shape
-    }
-}
 
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
@@ -67,47 +58,10 @@ impl Spring {
         Ok(Self { cause, shape: SpringShape::deserialize(body)? }.into())
     }
 
-    /// The torque of a link about its own joint is of first order in that joint's angle.
-    pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
-        let mut out = vec![(names::GEAR_CYCLIC, form.place())];
-        if let Place::Joint(joint) = form.place() {
-            out.push((names::LINK_MASS, Place::Links(joint, joint)));
-        }
-        out
-    }
-
     /// Sine and cosine of every order.
     fn waves(&self, q: &[f64]) -> impl Iterator<Item = f64> {
         let angle = q[self.shape.joint];
         (1..=self.shape.orders).flat_map(move |order| <[f64; 2]>::from(libm::sincos(f64::from(order) * angle)))
-    }
-}
-
-impl Effect for Spring {
-    fn name(&self) -> &'static str {
-        self.cause.name()
-    }
-
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let named = [
-            ("sin", Unit::NewtonMetre, 1e5),
-            ("cos", Unit::NewtonMetre, 1e5),
-            ("sin2", Unit::NewtonMetre, 1e5),
-            ("cos2", Unit::NewtonMetre, 1e5),
-        ];
-        parameters(self, named.into_iter().take(2 * self.shape.orders as usize))
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
-        self.waves(state.q).enumerate().for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
-    }
-
-    fn needs_torque(&self) -> bool {
-        true
-    }
-
-    fn load_correction(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
-        out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
     }
 }
 
@@ -122,6 +76,30 @@ impl Placed for Spring {
 
     fn variables(&self) -> Vec<Variable> {
         vec![Variable::Angle { joint: self.shape.joint }]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let names = ["sin", "cos", "sin2", "cos2"].into_iter().take(2 * self.shape.orders as usize);
+        names.map(|name| (name.into(), Unit::NewtonMetre, 1e5)).collect()
+    }
+
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
+        self.waves(state.q).enumerate().for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+
+    fn load_correction(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
+        out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
+    }
+
+    /// The torque of a link about its own joint is of first order in that joint's angle.
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        let (joint, place) = (self.shape.joint, self.place());
+        let balancer = (self.cause.name() == names::COUNTERBALANCE).then_some((names::CABLE_DRAG, place));
+        balancer.into_iter().chain([(names::GEAR_CYCLIC, place), (names::LINK_MASS, Place::Links(joint, joint))]).collect()
     }
 
     fn is_of_torque_model(&self) -> bool {

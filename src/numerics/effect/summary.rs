@@ -52,15 +52,26 @@ impl<'a> Summary<'a> {
         self.forms.iter().map(|form| form.cause()).find(|own| own.name() == name).or_else(|| cause(name))
     }
 
-    /// The first form of a type.
-    pub(super) fn form<T: super::Placed>(&self) -> Option<&'a T> {
-        self.forms.iter().find_map(Form::as_a)
+    /// The forms under a cause's name, each with its fitted numbers.
+    fn own(&self, name: &'static str) -> impl Iterator<Item = (&'a Form, Vec<&'a ParameterEstimate>)> {
+        let numbers = move |form: usize| self.parameters.iter().filter(|n| n.form == form).collect();
+        let forms = self.forms.iter().enumerate().filter(move |(_, form)| form.name() == name);
+        forms.map(move |(number, form)| (form, numbers(number)))
     }
 
-    /// The numbers of the first form of a type.
-    pub(super) fn of_form<T: super::Placed>(&self) -> impl Iterator<Item = &'a ParameterEstimate> {
-        let number = self.forms.iter().position(|form| form.as_a::<T>().is_some());
-        self.parameters.iter().filter(move |estimate| Some(estimate.form) == number)
+    /// What the first form under a cause's name that has words of its own says: see [`Placed::words`](super::Placed::words).
+    pub(super) fn words(&self, name: &'static str) -> Option<String> {
+        self.own(name).find_map(|(form, numbers)| form.words(&numbers))
+    }
+
+    /// The fitted numbers of the first form under a cause's name that has none.
+    pub(super) fn wordless(&self, name: &'static str) -> Vec<&'a ParameterEstimate> {
+        self.own(name).find(|(form, numbers)| form.words(numbers).is_none()).map(|(_, numbers)| numbers).unwrap_or_default()
+    }
+
+    /// What the forms under a cause's name depend on.
+    pub(super) fn variables(&self, name: &'static str) -> Vec<Variable> {
+        self.own(name).flat_map(|(form, _)| form.variables()).collect()
     }
 
     /// The terms under a cause's name.
@@ -70,9 +81,7 @@ impl<'a> Summary<'a> {
 
     /// The terms under a cause's name, each with its fitted numbers.
     pub(super) fn estimates(&self, name: &'static str) -> impl Iterator<Item = (&'a Term, Vec<&'a ParameterEstimate>)> {
-        let own = move |form: usize| self.parameters.iter().filter(|n| n.form == form).collect();
-        let forms = self.forms.iter().enumerate().filter(move |(_, form)| form.cause().name() == name);
-        forms.filter_map(move |(number, form)| Some((form.term()?, own(number))))
+        self.own(name).filter_map(|(form, numbers)| Some((form.term()?, numbers)))
     }
 
     /// The first number with its unit.

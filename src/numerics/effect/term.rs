@@ -2,7 +2,7 @@
 
 use super::form::Placed;
 use super::law::Factor;
-use super::{ArmState, Basis, Cause, Deflection, Effect, Form, Law, Motion, ParameterSpec, Place, Survey, Variable};
+use super::{ArmState, Basis, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
@@ -87,14 +87,21 @@ impl PartialEq for Term {
     }
 }
 
-impl Effect for Term {
-    fn name(&self) -> &'static str {
-        self.cause.name()
+impl Placed for Term {
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
     }
 
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let numbers = self.cause.numbers(self, robot);
-        super::form::parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
+    fn place(&self) -> Place {
+        self.motion.place()
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        self.law.variables()
+    }
+
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
+        self.cause.numbers(self, robot)
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -115,20 +122,6 @@ impl Effect for Term {
         let needed = self.law.factors().any(|factor| velocity(factor.of));
         (needed && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
     }
-}
-
-impl Placed for Term {
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
-    }
-
-    fn place(&self) -> Place {
-        self.motion.place()
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        self.law.variables()
-    }
 
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         self.cause.near(self, survey, level).into_iter().map(Form::from).collect()
@@ -140,6 +133,14 @@ impl Placed for Term {
 
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
         self.cause.called(self, p, survey)
+    }
+
+    fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        self.cause.impossible(self, p, error, survey)
+    }
+
+    fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
+        self.cause.identities(self, called)
     }
 
     fn term(&self) -> Option<&Term> {

@@ -2,8 +2,7 @@
 
 use super::motion::{SHORT, extent};
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
-    warmth,
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, warmth,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -64,8 +63,8 @@ impl Cause for ThermalGrowth {
         warmth::near(term, survey, level)
     }
 
-    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        let (term, value) = (form.term()?, *p.first()?);
+    fn impossible(&self, term: &Term, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let value = *p.first()?;
         let warm_up = matches!(term.basis(), Basis::Settling { .. });
         let most = if warm_up { WARM_UP * MATERIAL } else { MATERIAL };
         let per = if warm_up { "in all" } else { "for each kelvin" };

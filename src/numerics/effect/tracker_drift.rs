@@ -2,8 +2,8 @@
 
 use super::basis::around;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term,
-    Variable, warmth,
+    Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable,
+    warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -64,8 +64,8 @@ impl Cause for TrackerDrift {
         }
     }
 
-    fn impossible(&self, form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        warmth::impossible(form.term()?, survey)
+    fn impossible(&self, term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        warmth::impossible(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -1,8 +1,8 @@
 //! `tracker_refraction`: ranges scale with the air's temperature, which the instrument does not follow.
 
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable,
-    figure, warmth,
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
+    warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -49,8 +49,8 @@ impl Cause for TrackerRefraction {
         warmth::near(term, survey, level)
     }
 
-    fn impossible(&self, form: &Form, p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        let (term, value) = (form.term()?, *p.first()?);
+    fn impossible(&self, term: &Term, p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let value = *p.first()?;
         let warm_up = matches!(term.basis(), Basis::Settling { .. });
         let most = if warm_up { WARM_UP * AIR } else { AIR };
         let per = if warm_up { "in all" } else { "for each kelvin" };

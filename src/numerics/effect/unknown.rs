@@ -13,8 +13,8 @@ use super::{
     Term, Variable, names, warmth,
 };
 use super::{frames, interactions};
-use crate::criteria::words::SLOW;
 use crate::criteria::effect::{HARDLY_EVER, LOW_ORDERS, OPEN, RARE, RARER, UNCOMMON};
+use crate::criteria::words::SLOW;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use words::in_words;
@@ -321,16 +321,16 @@ impl Cause for Unknown {
         part.forms.iter().all(is_part)
     }
 
-    fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
-        let Some(term) = form.term() else { return Vec::new() };
-        let joint = matches!(form.place(), Place::Joint(_));
+    fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
+        let place = term.motion().place();
+        let joint = matches!(place, Place::Joint(_));
         match (term.basis(), term.law().first.of) {
             (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
                 vec![(names::AXIS_WOBBLE, Place::Joint(by))]
             }
             // No motor current tells of a pull.
-            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, form.place())],
-            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, form.place())],
+            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
+            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
             _ => Vec::new(),
         }
     }

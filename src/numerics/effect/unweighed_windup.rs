@@ -3,10 +3,9 @@
 //!
 //! Bodies are those from the joint outwards, their moments base parameters: two a joint that turns. Bodies that slide are left out.
 
-use super::form::parameters;
 use super::skeleton::moments;
 use super::{
-    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed, Survey, Variable, figure, names,
 };
 use crate::robot::{Measurements, Posture, RobotModel};
 use crate::units::Unit;
@@ -20,7 +19,7 @@ pub(super) struct UnweighedWindup {
     shape: WindupShape,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct WindupShape {
     /// From 0.
     joint: usize,
@@ -31,7 +30,7 @@ struct WindupShape {
 }
 
 /// A direction in which a body has a first moment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Moment {
     /// From 0.
     body: usize,
@@ -54,12 +53,6 @@ const PHASE: f64 = 1.5;
 const WIDE: f64 = 0.01;
 /// rad, under the weight of one body at full stretch; the softest joints (20,000 Nm/rad under 200 Nm) yield as much.
 const LARGEST: f64 = 0.01;
-
-impl PartialEq for UnweighedWindup {
-    fn eq(&self, other: &Self) -> bool {
-        self.cause.name() == other.cause.name() && self.shape == other.shape
-    }
-}
 
 impl UnweighedWindup {
     /// Of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file gives no mass.
@@ -111,19 +104,11 @@ impl UnweighedWindup {
         Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
     }
 
-    /// The deflection of a finding that has such a form, in words: up to so many arcsec.
-    pub fn size(summary: &Summary) -> Option<String> {
-        let windup: &Self = summary.form()?;
-        Some(format!("by up to {} arcsec where its links stretch out level", windup.largest(summary)))
-    }
-
-    /// The deflection (arcsec) of a finding's form with all its bodies level, with its standard deviation where that is known, as if the
-    /// moments were independent.
-    pub fn largest(&self, summary: &Summary) -> String {
-        let number = summary.forms.iter().position(|form| form.as_a::<Self>() == Some(self));
-        let own = summary.parameters.iter().filter(|estimate| Some(estimate.form) == number);
+    /// The deflection (arcsec) with all its bodies level, with its standard deviation where that is known, as if the moments were
+    /// independent.
+    fn largest(&self, numbers: &[&ParameterEstimate]) -> String {
         let moments: Vec<(usize, f64, Option<f64>)> =
-            self.shape.moments.iter().zip(own).map(|(moment, own)| (moment.body, own.value, own.sigma)).collect();
+            self.shape.moments.iter().zip(numbers).map(|(moment, own)| (moment.body, own.value, own.sigma)).collect();
         let (mut size, mut variance) = (0.0, Some(0.0));
         for body in moments.chunk_by(|a, b| a.0 == b.0) {
             let length = body.iter().map(|(_, value, _)| value * value).sum::<f64>().sqrt();
@@ -137,12 +122,6 @@ impl UnweighedWindup {
             Some(variance) => format!("{} +- {}", figure(size, 0), figure(variance.sqrt(), 0)),
             None => figure(size, 0),
         }
-    }
-
-    /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
-    pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
-        let alone = form.as_a::<Self>().is_some_and(|windup| windup.shape.own_angle);
-        if alone { vec![(names::GEAR_CYCLIC, form.place()), (names::COUNTERBALANCE, form.place())] } else { Vec::new() }
     }
 }
 
@@ -179,19 +158,32 @@ impl Moment {
     }
 }
 
-impl Effect for UnweighedWindup {
-    fn name(&self) -> &'static str {
-        self.cause.name()
+impl Placed for UnweighedWindup {
+    fn place(&self) -> Place {
+        Place::Joint(self.shape.joint)
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
+    }
+
+    /// Moments beside the arm's lines, which are small: those along them are as large as links are heavy.
+    fn of_one_size(&self) -> Vec<usize> {
+        (0..self.shape.moments.len()).filter(|k| !self.shape.moments[*k].outwards).collect()
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.shape.joint }]
+    }
+
+    fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut names: Vec<String> = Vec::new();
         for Moment { body, outwards, .. } in &self.shape.moments {
             let first = format!("link{}", body + 1);
             let name = if *outwards || !names.contains(&first) { first } else { format!("{first}_across") };
             names.push(name);
         }
-        parameters(self, names.iter().map(|name| (name.as_str(), Unit::Radian, WIDE)))
+        names.into_iter().map(|name| (name, Unit::Radian, WIDE)).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -212,25 +204,6 @@ impl Effect for UnweighedWindup {
     fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
         (Vector3::from(robot.description().gravity) == Vector3::zeros()).then(|| "the robot file gives no gravity".into())
     }
-}
-
-impl Placed for UnweighedWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.shape.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
-    }
-
-    /// Moments beside the arm's lines, which are small: those along them are as large as links are heavy.
-    fn of_one_size(&self) -> Vec<usize> {
-        (0..self.shape.moments.len()).filter(|k| !self.shape.moments[*k].outwards).collect()
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.shape.joint }]
-    }
 
     fn variant(&self) -> String {
         "gravity".into()
@@ -247,8 +220,18 @@ impl Placed for UnweighedWindup {
         match self.shape.own_angle {
             true if has(false) && across > PHASE * outwards => names::GEAR_CYCLIC,
             _ if has(true) && outwards < 0.0 => names::CABLE_DRAG,
-            _ => self.name(),
+            _ => self.cause.name(),
         }
+    }
+
+    /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        let names = [names::GEAR_CYCLIC, names::COUNTERBALANCE].into_iter().filter(|_| self.shape.own_angle);
+        names.map(|name| (name, self.place())).collect()
+    }
+
+    fn words(&self, numbers: &[&ParameterEstimate]) -> Option<String> {
+        Some(self.largest(numbers))
     }
 
     fn body(&self) -> serde_json::Value {

@@ -1,8 +1,8 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
 use super::{
-    Cause, CauseDescription, FittedForms, Form, Hypothesis, Measure, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey,
-    Term, change, holder, names,
+    Cause, CauseDescription, FittedForms, Hypothesis, Measure, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term,
+    change, holder, names,
 };
 use crate::robot::RobotModel;
 
@@ -38,8 +38,8 @@ impl Cause for ZeroShift {
         format!("the zero of {} steps by {}{}", summary.place, summary.size(), summary.when(self.name()))
     }
 
-    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        if form.place() == Place::Joint(0) { vec![(names::BASE_SHIFT, Place::Base)] } else { Vec::new() }
+    fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
+        if term.motion().place() == Place::Joint(0) { vec![(names::BASE_SHIFT, Place::Base)] } else { Vec::new() }
     }
 
     fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {

@@ -13,9 +13,7 @@ use super::pool::{Beside, CachedHypotheses};
 use super::round::{EstimatedCause, FitState, Fitter};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
-use crate::effect::{
-    DeclaredCause, DeclaredForm, Effect, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people,
-};
+use crate::effect::{DeclaredCause, DeclaredForm, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people};
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
 use shape_sigma::shape_sigmas;

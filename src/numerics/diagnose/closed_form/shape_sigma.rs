@@ -1,7 +1,7 @@
 //! How well shape numbers are known: by the curvature of what is left, with all coefficients fitted at every step.
 
 use crate::diagnose::pool::Beside;
-use crate::effect::{DeclaredForm, Form};
+use crate::effect::Form;
 use nalgebra::DMatrix;
 
 /// Steps as shares of a shape number's range.
@@ -9,11 +9,11 @@ const STEP: f64 = 1e-3;
 
 /// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
 pub(super) fn shape_sigmas(form: &Form, beside: &Beside) -> Vec<Option<f64>> {
-    let Some(declared) = form.as_a::<DeclaredForm>() else { return Vec::new() };
+    let Some(declared) = form.declared() else { return Vec::new() };
     let steps = declared.shape_steps(STEP);
     let count = steps.len();
     let unknown = vec![None; count];
-    if count == 0 || declared.declared().pattern().jumps() {
+    if count == 0 || declared.declaration().pattern().jumps() {
         return unknown;
     }
     let at = |moves: &[(usize, f64)]| {

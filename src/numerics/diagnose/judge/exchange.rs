@@ -7,7 +7,7 @@ use crate::criteria::judge::RIVALS;
 use crate::criteria::search::EQUIVALENT;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Effect, Place, follows, names};
+use crate::effect::{Place, follows, names};
 
 /// Exchanges or drops causes that make the folds worse; `set` holds the causes' positions in the pool, in their order.
 pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &ModelComparison) -> (FitState, Vec<FoldGain>) {

@@ -6,7 +6,6 @@ use super::comparison::ModelComparison;
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::finding_groups::{FindingGroups, groups};
 use crate::diagnose::round::FitState;
-use crate::effect::Effect;
 use crate::estimate::ParameterStatus;
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool

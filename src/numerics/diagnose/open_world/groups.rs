@@ -41,9 +41,10 @@ impl FreeGroup {
         self.motion.place()
     }
 
-    /// Whether time is one of its variables.
+    /// Whether it depends on what drifts with the recording: rows after it are beyond all that was seen.
     pub fn follows_time(&self) -> bool {
-        self.law.factors().any(|factor| factor.of == Variable::Time)
+        let drifts = |of: Variable| matches!(of, Variable::Time | Variable::Temperature | Variable::Lagging { .. });
+        self.law.factors().any(|factor| drifts(factor.of))
     }
 
     /// As what may join the model: a law without a name.

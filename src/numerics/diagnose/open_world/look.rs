@@ -12,7 +12,7 @@ use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::effect::{Effect, Place, Survey};
+use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -9,7 +9,7 @@ use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Effect, Place, names};
+use crate::effect::{Place, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -137,8 +137,11 @@ impl NameCase<'_, '_, '_, '_> {
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
         let free = instead.logs.iter().map(|(place, log)| (*place, open + log));
-        let (finer, mut free): (Vec<_>, Vec<_>) =
-            if is_named && self.is_nearly_all(named, rest, &own, instead) { free.partition(|(at, _)| *at == place) } else { (Vec::new(), free.collect()) };
+        let (finer, mut free): (Vec<_>, Vec<_>) = if is_named && self.is_nearly_all(named, rest, &own, instead) {
+            free.partition(|(at, _)| *at == place)
+        } else {
+            (Vec::new(), free.collect())
+        };
         names.extend(finer);
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
@@ -167,7 +170,8 @@ impl NameCase<'_, '_, '_, '_> {
     /// Whether the named laws of a finding explain nearly all of what the free form at its place does instead of it.
     fn is_nearly_all(&self, named: &NamedFinding, rest: &KnownCauses, own: &Own, instead: &SurveyedPlaces) -> bool {
         let Some(form) = instead.best.iter().find(|form| form.place == named.key.1) else { return false };
-        let gain = if named.lawful.len() < named.own.len() { self.evidence_of_causes(rest, &named.lawful).gain } else { own.gain };
+        let gain =
+            if named.lawful.len() < named.own.len() { self.evidence_of_causes(rest, &named.lawful).gain } else { own.gain };
         gain > (1.0 - *NEARLY) * own.gain.max(form.gain)
     }
 

@@ -3,7 +3,7 @@
 use super::{CauseSearch, with};
 use crate::criteria::search::FAMILIES;
 use crate::diagnose::pool::Beside;
-use crate::effect::{Effect, Hypothesis};
+use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
 
 impl CauseSearch<'_, '_> {

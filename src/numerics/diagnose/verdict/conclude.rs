@@ -2,12 +2,12 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
+use super::not_observable::{next, not_observable, not_tried};
+use super::unseen::unseen;
 use crate::criteria::judge::FOLDS;
 use crate::criteria::noise::{LOUD, REPEATS, TOO_LOUD};
 use crate::criteria::search::SIGNIFICANT;
 use crate::criteria::words::{NAMELESS, NOT_NOISE, REST, WEAK};
-use super::not_observable::{next, not_observable, not_tried};
-use super::unseen::unseen;
 use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::Misfit;

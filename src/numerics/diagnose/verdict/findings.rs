@@ -4,8 +4,8 @@ use super::faults::{faults, rows_apart};
 use super::last_round::LastRound;
 use super::probability::{weigh, weigh_fault};
 use super::rivals::{exact, rivals};
-use crate::diagnose::finding_groups::{FindingKey, groups};
 use crate::criteria::words::{ASTRAY, FIRM, REFINEMENT, REJECTED};
+use crate::diagnose::finding_groups::{FindingKey, groups};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
@@ -13,8 +13,8 @@ use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::diagnose::words::{left_out, none_of_the_list, not_so, sentence, small, told};
 use crate::effect::{
-    Basis, Clock, Effect, FittedForms, Form, Hypothesis, ModelledFinding, ParameterEstimate, Place, Summary,
-    Variable, follows, names, people,
+    Basis, Clock, FittedForms, Form, Hypothesis, ModelledFinding, ParameterEstimate, Place, Summary, Variable, follows, names,
+    people,
 };
 use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
@@ -168,7 +168,7 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
         let values = &state.model.x[range.clone()];
         // The finer shape of a finding is not what it is called by.
         let own = effect != names::UNKNOWN && [form.name(), form.called(values, last.survey)].contains(&effect);
-        let beyond = own.then(|| form.cause().impossible(form, values, &error, last.survey)).flatten();
+        let beyond = own.then(|| form.impossible(values, &error, last.survey)).flatten();
         if beyond.is_some() {
             return beyond;
         }

@@ -5,7 +5,7 @@ use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::types::Located;
-use crate::effect::{Effect, Survey};
+use crate::effect::Survey;
 use crate::estimate::ErrorScale;
 use std::collections::BTreeMap;
 

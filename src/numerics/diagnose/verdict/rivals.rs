@@ -4,7 +4,7 @@ use super::last_round::LastRound;
 use crate::criteria::search::EQUIVALENT;
 use crate::criteria::words::FIRM;
 use crate::diagnose::types::RivalCause;
-use crate::effect::{Effect, Form, Place};
+use crate::effect::{Form, Place};
 
 /// Other single causes that do as well in place of `own`, with numbers that they can have.
 pub(super) fn rivals(last: &LastRound, rest: &[usize], own: &[usize], bic: f64, named: (&str, Place)) -> Vec<RivalCause> {
@@ -38,12 +38,12 @@ fn is_possible(last: &LastRound, set: &[usize], h: usize) -> bool {
     let solution = pool.solve(set);
     let first: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
     let error = |column: usize| *FIRM * solution.error(first + column);
-    form.cause().impossible(form, &own, &error, last.survey).is_none()
+    form.impossible(&own, &error, last.survey).is_none()
 }
 
 /// Identities of kinematics and statics, whatever the data.
 pub(super) fn exact(effect: &str, forms: &[Form], rivals: &mut Vec<RivalCause>) {
-    for (other, place) in forms.iter().flat_map(|form| form.cause().identities(form, effect)) {
+    for (other, place) in forms.iter().flat_map(|form| form.identities(effect)) {
         if !rivals.iter().any(|rival| rival.effect == other && rival.place == place) {
             rivals.push(RivalCause { effect: other, place, delta_bic: 0.0, probability: 0.0 });
         }

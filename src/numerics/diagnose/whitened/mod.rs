@@ -9,7 +9,7 @@ mod reading_lines;
 mod travel;
 
 use crate::effect::{
-    Basis, Deflection, Direction, Effect, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
+    Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
 use crate::observation::{MeasurementKind, Residual, kinds};

@@ -9,7 +9,6 @@ pub(crate) use verdict_statement::{Ground, statement};
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
-use crate::criteria::judge::RIVALS;
 use crate::criteria::words::NAMED;
 use crate::effect::Form;
 use crate::error::counted;

@@ -11,7 +11,8 @@ pub(super) struct Stribeck;
 const USUAL: f64 = 0.1;
 /// Widths of the sign.
 const NARROWEST: f64 = 2.0;
-const SPEEDS: [&[f64]; 5] = [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0]];
+const SPEEDS: [&[f64]; 8] =
+    [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0], &[0.06, 2.0], &[USUAL, 2.0], &[0.17, 2.0]];
 /// Of speed over its scale: 1 as a rule, found between these (Armstrong-Helouvry, 1991, reports 0.5 to 2).
 const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
@@ -24,13 +25,17 @@ impl TorqueCause for Stribeck {
         at_each_joint_with(&Stribeck, scene, 1, &SPEEDS)
     }
 
+    fn price(&self, form: &TorqueForm) -> f64 {
+        if form.shape.get(1).is_none_or(|exponent| *exponent == 1.0) { 6.0 } else { 10.0 }
+    }
+
     fn modifies(&self) -> &'static [&'static str] {
         &[COULOMB]
     }
 
     /// What falls within the width over which the sign turns is a sign of another width.
     fn is_itself(&self, form: &TorqueForm, scene: &DynamicScene) -> bool {
-        form.shape[0] > NARROWEST * scene.sign_width
+        form.shape[0] > NARROWEST * scene.sign_widths[form.joint()]
     }
 
     fn is_positive(&self) -> bool {

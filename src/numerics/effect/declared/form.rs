@@ -4,9 +4,7 @@ use super::cause::DeclaredCause;
 use super::declaration::{EffectDeclaration, ShapeRange};
 use super::formula::Formula;
 use super::quantity::{QuantityKind, RowQuantity};
-use crate::effect::{
-    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Motion, ParameterSpec, Place, Placed, Survey, Variable,
-};
+use crate::effect::{ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, Place, Placed, Survey, Variable};
 use crate::robot::{Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
@@ -81,8 +79,8 @@ impl DeclaredForm {
         Ok(Self { cause, motion, shape }.into())
     }
 
-    /// The declared cause.
-    pub fn declared(&self) -> &'static DeclaredCause {
+    /// Its cause, as it was declared.
+    pub fn declaration(&self) -> &'static DeclaredCause {
         self.cause
     }
 
@@ -153,14 +151,21 @@ impl PartialEq for DeclaredForm {
     }
 }
 
-impl Effect for DeclaredForm {
-    fn name(&self) -> &'static str {
-        self.cause.name()
+impl Placed for DeclaredForm {
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
     }
 
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let numbers = self.cause.pattern().numbers(self.motion, robot);
-        crate::effect::form::parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
+    fn place(&self) -> Place {
+        self.motion.place()
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        self.all_variables()
+    }
+
+    fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
+        self.cause.pattern().numbers(self.motion, robot)
     }
 
     /// A row in which a law is no number is left alone by it.
@@ -186,23 +191,13 @@ impl Effect for DeclaredForm {
         let moving = self.quantities().iter().any(|quantity| quantity.kind == QuantityKind::Velocity);
         (moving && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
     }
-}
-
-impl Placed for DeclaredForm {
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
-    }
-
-    fn place(&self) -> Place {
-        self.motion.place()
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        self.all_variables()
-    }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
         self.shapes(level).into_iter().map(|shape| Self { shape, ..self.clone() }.into()).collect()
+    }
+
+    fn declared(&self) -> Option<&DeclaredForm> {
+        Some(self)
     }
 
     fn shape_numbers(&self) -> Vec<(String, f64)> {
