@@ -35,7 +35,7 @@ impl TorqueCause for Stribeck {
 
     /// What falls within the width over which the sign turns is a sign of another width.
     fn is_itself(&self, form: &TorqueForm, scene: &DynamicScene) -> bool {
-        form.shape[0] > NARROWEST * scene.sign_widths[form.joint()]
+        form.shape[0] > NARROWEST * scene.width_at(form.joint())
     }
 
     fn is_positive(&self) -> bool {
