@@ -1,6 +1,6 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::joint_table::{strongest_orders};
+use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
     Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,

@@ -2,8 +2,8 @@
 
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec,
-    ParameterEstimate, Place, Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
+    Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;

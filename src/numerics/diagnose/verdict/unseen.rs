@@ -3,7 +3,7 @@
 use super::last_round::LastRound;
 use crate::criteria::words::FOUND;
 use crate::diagnose::words::hidden;
-use crate::effect::{HiddenSize};
+use crate::effect::HiddenSize;
 use std::collections::BTreeMap;
 
 /// Sentences for causes that could be as large as usual and would not be found, one a cause.
