@@ -165,7 +165,9 @@ impl Parameters {
 
     /// What these correct: of an outside simulation they say nothing of the robot file's model.
     pub fn corrected(&self) -> Corrected {
-        let outside = self.0.iter().any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE));
+        // Tables before version 1.2 say it in their remarks alone, and must not correct commands.
+        let said = |row: &ParameterRow| row.remark.as_deref().is_some_and(|remark| remark.starts_with(Corrected::REMARK));
+        let outside = self.0.iter().any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || said(row));
         if outside { Corrected::OutsideSimulation } else { Corrected::RobotFile }
     }
 
@@ -333,7 +335,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_corrected_is_a_column_whatever_a_remark_says() {
+    fn what_is_corrected_is_a_column_and_what_older_tables_say_first() {
         let row = |remark: Option<&str>| ParameterRow {
             name: "joint_offset.j2".into(),
             effect: "joint_offset".into(),
@@ -357,6 +359,8 @@ mod tests {
             let outside = bare.correcting(Corrected::OutsideSimulation);
             assert_eq!(outside.with_advice(&advice).corrected(), Corrected::OutsideSimulation);
         }
-        assert_eq!(Parameters(vec![row(Some(Corrected::REMARK))]).corrected(), Corrected::RobotFile);
+        let mentioned = format!("not so: {}", Corrected::REMARK);
+        assert_eq!(Parameters(vec![row(Some(&mentioned))]).corrected(), Corrected::RobotFile);
+        assert_eq!(Parameters(vec![row(Some(Corrected::REMARK))]).corrected(), Corrected::OutsideSimulation);
     }
 }
