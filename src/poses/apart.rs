@@ -7,7 +7,7 @@ use super::{PoseRequest, wish};
 use crate::audit::{POSITIONS, diagnosis};
 use crate::description::RobotDescription;
 use crate::diagnose::{DiagnosedModel, contest};
-use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place, cause};
+use crate::effect::{CAUSES, Form, JointTable, Load, Place, cause};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::identified::convention_of;

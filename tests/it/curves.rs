@@ -3,7 +3,7 @@
 use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::description::{JointKind, RobotDescription};
-use calib::effect::{Effect, Form, Load};
+use calib::effect::{Form, Load};
 use calib::robot::RobotModel;
 use calib::stage::{Labelled, Report, ReportReads};
 use calib::table::*;

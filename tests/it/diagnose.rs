@@ -14,7 +14,7 @@ mod without;
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
-use calib::effect::{Effect, Form, Load};
+use calib::effect::{Form, Load};
 use calib::estimate::choose::{Site, median};
 use calib::estimate::{FitOptions, Model, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};

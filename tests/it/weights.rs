@@ -103,7 +103,7 @@ fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
     let names = |form: &Form| form.parameters(&robot).into_iter().map(|spec| spec.name).collect::<Vec<_>>();
     let mut kinds = [0; 3];
     for form in forms.iter().filter(|form| form.place() == Place::Joint(1)) {
-        let (names, identities) = (names(form), form.cause().identities(form, "joint_compliance"));
+        let (names, identities) = (names(form), form.identities("joint_compliance"));
         let alone = names.iter().all(|name| name.starts_with("joint_compliance.j2.gravity.link2"));
         let same: &[(&str, Place)] =
             if alone { &[("gear_cyclic", Place::Joint(1)), ("counterbalance", Place::Joint(1))] } else { &[] };

@@ -29,7 +29,7 @@ fn why(form: Value, numbers: &[f64], error: f64, torque: f64) -> Option<String> 
     let compliance = vec![1e-6; robot.joints()];
     let survey = Survey::new(&robot, &data, &rows, &torques, &compliance);
     let form: Form = serde_json::from_value(form).expect("a form");
-    form.cause().impossible(&form, numbers, &|_| error, &survey)
+    form.impossible(numbers, &|_| error, &survey)
 }
 
 fn law(motion: Value, of: Value, basis: Value) -> Value {
