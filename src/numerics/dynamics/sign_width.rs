@@ -2,6 +2,7 @@
 
 use super::problem::TorqueProblem;
 use super::scene::SIGN_WIDTHS;
+use super::weighted::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// A fall of the logarithm of the mean square, summed over joints, that counts.
@@ -15,26 +16,24 @@ const RIDGE: f64 = 1e-6;
 pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
     let runs = problem.runs(false);
     let rows: Vec<usize> = runs.iter().flat_map(Clone::clone).collect();
-    let base = problem.base_courses(&rows);
-    let mut room = Vec::new();
+    let chosen = |course: &Vec<f64>| rows.iter().map(|row| course[*row]).collect::<Vec<f64>>();
+    let velocities = problem.reduction.reduce(problem.scene.velocity.clone());
+    let constant = problem.reduction.reduce(vec![vec![1.0; problem.scene.rows()]]);
+    let of_joint = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
+        let columns = inertial.into_iter().chain([chosen(&velocities[joint]), chosen(&constant[0])]).collect();
+        SteadyColumns::new(columns, &chosen(&problem.measured[joint]))
+    };
+    let steady: Vec<SteadyColumns> = problem.base_courses(&rows).into_iter().enumerate().map(of_joint).collect();
     let mut left_by = |width: f64| {
         problem.scene.sign_width = width;
-        let mut left = 0.0;
-        for (joint, inertial) in base.iter().enumerate() {
-            let scene = &problem.scene;
-            let signs = scene.velocity[joint].iter().map(|velocity| scene.sign(*velocity)).collect::<Vec<f64>>();
-            let courses = [scene.velocity[joint].clone(), signs, vec![1.0; scene.rows()]];
-            let reduced = courses.map(|mut course| problem.reduction.reduce(&mut course, &mut room));
-            let friction = reduced.iter().map(|course| rows.iter().map(|row| course[*row]).collect::<Vec<f64>>());
-            let columns: Vec<Vec<f64>> = inertial.iter().cloned().chain(friction).collect();
-            let measured: Vec<f64> = rows.iter().map(|row| problem.measured[joint][*row]).collect();
-            left += mean_square_left(&columns, &measured).ln();
-        }
-        left
+        let scene = &problem.scene;
+        let sign = |course: &Vec<f64>| course.iter().map(|velocity| scene.sign(*velocity)).collect::<Vec<f64>>();
+        let signs = problem.reduction.reduce(scene.velocity.iter().map(sign).collect());
+        steady.iter().zip(&signs).map(|(steady, sign)| steady.mean_square_left(&chosen(sign)).ln()).sum()
     };
     let mut best = (f64::INFINITY, SIGN_WIDTHS[0]);
     let mut try_width = |width: f64, best: &mut (f64, f64)| {
-        let left = left_by(width);
+        let left: f64 = left_by(width);
         if left < best.0 - BETTER {
             *best = (left, width);
         }
@@ -47,17 +46,55 @@ pub(super) fn sign_width(problem: &mut TorqueProblem) -> f64 {
     best.1
 }
 
-/// Of a fit of scaled columns.
-fn mean_square_left(columns: &[Vec<f64>], measured: &[f64]) -> f64 {
-    let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt() + 1e-12;
-    let rows = DMatrix::from_fn(measured.len(), columns.len(), |row, column| columns[column][row]);
-    let scales: Vec<f64> = columns.iter().map(|column| norm(column)).collect();
-    let rows = DMatrix::from_fn(rows.nrows(), rows.ncols(), |row, column| rows[(row, column)] / scales[column]);
-    let measured = DVector::from_column_slice(measured);
-    let mut gram = rows.tr_mul(&rows);
-    (0..gram.nrows()).for_each(|k| gram[(k, k)] += RIDGE);
-    let right = rows.tr_mul(&measured);
-    let Some(factor) = gram.cholesky() else { return measured.norm_squared() / measured.len() as f64 };
-    let left = &measured - &rows * factor.solve(&right);
-    left.norm_squared() / measured.len().max(1) as f64 + f64::MIN_POSITIVE
+/// What stands beside the sign of a joint whatever its width, scaled, and the torque that all of it explains.
+struct SteadyColumns {
+    rows: DMatrix<f64>,
+    /// Inner products of these columns, and with the torque.
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    measured: DVector<f64>,
+}
+
+impl SteadyColumns {
+    fn new(columns: Vec<Vec<f64>>, measured: &[f64]) -> Self {
+        let mut rows = DMatrix::zeros(measured.len(), columns.len());
+        for (column, values) in columns.iter().enumerate() {
+            let scale = scale(values);
+            rows.column_mut(column).iter_mut().zip(values).for_each(|(entry, value)| *entry = value / scale);
+        }
+        let measured = DVector::from_column_slice(measured);
+        let mut gram = DMatrix::zeros(columns.len(), columns.len());
+        for a in 0..columns.len() {
+            for b in 0..=a {
+                let product = dot(rows.column(a).as_slice(), rows.column(b).as_slice());
+                (gram[(a, b)], gram[(b, a)]) = (product, product);
+            }
+        }
+        let right = rows.tr_mul(&measured);
+        Self { rows, gram, right, measured }
+    }
+
+    /// Of a fit together with a sign.
+    fn mean_square_left(&self, sign: &[f64]) -> f64 {
+        let scale = scale(sign);
+        let sign = DVector::from_iterator(sign.len(), sign.iter().map(|value| value / scale));
+        let beside = self.rows.tr_mul(&sign);
+        let count = beside.len();
+        let mut gram = self.gram.clone().resize(count + 1, count + 1, 0.0);
+        for (column, product) in beside.iter().enumerate() {
+            (gram[(column, count)], gram[(count, column)]) = (*product, *product);
+        }
+        gram[(count, count)] = sign.norm_squared();
+        (0..=count).for_each(|k| gram[(k, k)] += RIDGE);
+        let right = self.right.clone().push(sign.dot(&self.measured));
+        let all = self.measured.len().max(1) as f64;
+        let Some(factor) = gram.cholesky() else { return self.measured.norm_squared() / all };
+        let solution = factor.solve(&right);
+        let left = &self.measured - &self.rows * solution.rows(0, count) - sign * solution[count];
+        left.norm_squared() / all + f64::MIN_POSITIVE
+    }
+}
+
+fn scale(column: &[f64]) -> f64 {
+    column.iter().map(|value| value * value).sum::<f64>().sqrt() + 1e-12
 }
