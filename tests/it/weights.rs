@@ -3,8 +3,8 @@
 use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{
-    Clock, Deflection, Direction, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place,
-    Summary, Survey, hypotheses, people, whole,
+    Clock, Deflection, Direction, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place, Summary,
+    Survey, hypotheses, people, whole,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::Pose;

@@ -94,8 +94,9 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number =
-        |at: usize| arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT POINTS [CRITERION ...]");
+    let number = |at: usize| {
+        arguments.get(at).and_then(|text| text.parse::<usize>().ok()).expect("SEED FIRST COUNT POINTS [CRITERION ...]")
+    };
     let (seed, first, count) = (number(0) as u64, number(1), number(2));
     let points = Some(number(3)).filter(|points| *points > 0);
     let wanted = arguments.get(4..).unwrap_or_default();

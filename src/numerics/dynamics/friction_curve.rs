@@ -44,9 +44,8 @@ fn curve(
     let all: Vec<usize> = columns.iter().copied().chain(slopes.0.iter().map(|(_, column)| *column)).collect();
     let covariance = uncertain.covariance(&all);
     let share = scene.width_at(joint) / scene.sign_width;
-    let law = |form: &TorqueForm, velocity: f64, width: f64| {
-        form.cause.friction(form, velocity, (velocity / (share * width)).tanh())
-    };
+    let law =
+        |form: &TorqueForm, velocity: f64, width: f64| form.cause.friction(form, velocity, (velocity / (share * width)).tanh());
     for velocity in &curve.velocity {
         let of = |width: f64| own.iter().filter_map(move |(_, form)| law(form, *velocity, width));
         let laws: Vec<f64> = of(scene.sign_width).collect();
