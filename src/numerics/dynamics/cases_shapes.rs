@@ -19,23 +19,11 @@ fn covers((value, sigma): (f64, f64), truth: f64) -> bool {
 }
 
 #[test]
-fn a_law_of_another_shape_leaves_no_second_name() {
-    // A zero that comes only as the sensor warms up.
+fn a_zero_that_drifts_is_an_offset_and_nothing_else() {
     let drifting = diagnosed(&|row| if row.0 == 3 { 3.0 * (1.0 - 0.5 * (-row.1 / 10.0).exp()) } else { 0.0 });
     assert_eq!(found(&drifting), ["current_offset joint 4"], "{:#?}", drifting.withdrawn);
     assert!(
         covers(stated(&drifting, "current_offset", "offset"), 3.0) && covers(stated(&drifting, "current_offset", "time"), 10.0)
-    );
-    // A drive whose table is right at its greatest current.
-    let falling = diagnosed(&|row| if row.0 == 1 { 0.2 * row.5 / (1.0 + row.5.abs() / 80.0) } else { 0.0 });
-    assert_eq!(found(&falling), ["torque_constant joint 2"], "{:#?}", falling.withdrawn);
-    assert!(covers(stated(&falling, "torque_constant", "half_at"), 80.0), "{:?}", falling.findings[0].parameters);
-    // Grease that thins.
-    let thinning = |velocity: f64| 6.0 * velocity.abs().powf(0.6) * velocity.signum() + 5.0 * (velocity / 0.003).tanh();
-    let thin = diagnosed(&|row| if row.0 == 1 { thinning(row.3) } else { 0.0 });
-    assert_eq!(found(&thin), ["coulomb_friction joint 2", "viscous_friction joint 2"], "{:#?}", thin.withdrawn);
-    assert!(
-        covers(stated(&thin, "viscous_friction", "exponent"), 0.6) && covers(stated(&thin, "coulomb_friction", "coulomb"), 5.0)
     );
 }
 
