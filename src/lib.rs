@@ -15,15 +15,16 @@
 //! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
+//! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
-//! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
+//! | [`effect`] | the library of physical effects, one file each, and their composition | criteria, robot, spatial |
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
-//! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
+//! | [`estimate`] | least squares, observability, swarm, network | criteria, effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
-//! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, observation, robot, spatial |
+//! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, estimate, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
@@ -76,6 +77,7 @@
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
 //! | kind of raw file | `src/stage/ingest/<name>.rs`, which hands out records | its `mod`, and one line in `FORMATS` of `src/stage/ingest/reading.rs` |
+//! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
@@ -146,7 +148,7 @@
 #![warn(missing_docs)]
 
 pub use calib_foundation::{description, statistics, units};
-pub use calib_numerics::{compensate, diagnose, dynamics, effect, error, estimate, observation, robot, spatial, yaml};
+pub use calib_numerics::{compensate, criteria, diagnose, dynamics, effect, error, estimate, observation, robot, spatial, yaml};
 pub use calib_twin as twin;
 
 pub mod program;

@@ -39,11 +39,12 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
     let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
-        let of = |effect: &'static str| rows(effect).find(|row| row.place == place).map_or(Value::Null, number);
+        let of = |effect: &'static str| rows(effect).find(|row| row.place == place && row.form.is_some()).map_or(Value::Null, number);
         let seen = &model.range[index];
         json!({
             "name": joint.name, "viscous": of("viscous_friction"), "coulomb": of("coulomb_friction"),
             "armature": of("rotor_inertia"), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
+            "sign_width_rad_s": seen.sign_width,
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
         })
     });
@@ -76,6 +77,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
             INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
         ),
         "sign_width_rad_s": model.sign_width,
+        "friction_lead_s": model.friction_lead,
         "joints": joints.collect::<Vec<_>>(),
         "links": links.collect::<Vec<_>>(),
         "causes": causes(torques),

@@ -11,10 +11,17 @@ pub(super) const FRICTION: &str = "coulomb_friction";
 pub(super) const ARMATURE: &str = "rotor_inertia";
 pub(super) const DRIVE: &str = "torque_constant";
 
-/// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found.
+/// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found. Formats know one number: of friction that
+/// grows with another power of speed, and of a torque constant that falls with torque, it is the one that is right at half of the greatest
+/// speed or load of the recording.
 pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
-    let own = torques.model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(joint));
-    own.and_then(|term| term.coefficients.first().copied())
+    let own = torques.model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
+    let (value, seen) = (own.coefficients.first().copied()?, torques.model.range.get(joint)?);
+    Some(match (effect, own.shape.first()) {
+        (DAMPING, Some(exponent)) if seen.speed > 0.0 => value * (0.5 * seen.speed).powf(exponent - 1.0),
+        (DRIVE, Some(half)) if seen.load.is_finite() => value / (1.0 + 0.5 * seen.load / half),
+        _ => value,
+    })
 }
 
 /// The same where formats allow no less than 0.

@@ -30,6 +30,8 @@ pub struct JointDescription {
     pub mass: Option<f64>,
     /// Centre of mass of its link, m, base frame at the zero pose.
     pub centre: Option<[f64; 3]>,
+    /// Friction that turns with the direction of motion, Nm at the joint, where torques of the arm have shown it.
+    pub coulomb: Option<f64>,
 }
 
 /// Joint `moved` turns by `ratio` times the angle of joint `by` (both from 0), as the controller believes.

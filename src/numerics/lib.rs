@@ -5,6 +5,7 @@
 
 use calib_foundation::{description, statistics, units};
 
+pub mod criteria;
 pub mod error;
 pub mod yaml;
 

@@ -4,9 +4,9 @@ use super::place;
 use super::run_state::{self, RunState};
 use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
-use crate::stage::{Context, Output};
+use crate::stage::{Context, Input, Output, StoredTable};
 use crate::store::frame::Frame;
-use crate::store::{Account, FinishedFile, PendingTable, Store, TableRef};
+use crate::store::{Account, FinishedFile, PendingTable, PublishedTable, Store, TableRef};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -27,11 +27,11 @@ pub(super) fn stage(
     account: &mut Account,
 ) -> Result<Vec<(String, PendingTable)>> {
     let stage = &state.plan.stages[index];
-    let frames = load(state, index, place.store)?;
+    let inputs = load(state, index, place.store)?;
     let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
     let context =
         Context { id: &stage.id, seed: state.seed(index), jobs: place.threads.current_num_threads(), services: &services };
-    let body = || place.threads.install(|| stage.stage.run(frames, &context));
+    let body = || place.threads.install(|| stage.stage.run(inputs, &context));
     let outputs = catch_unwind(AssertUnwindSafe(body))
         .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
     let lines = services.lines();
@@ -61,18 +61,38 @@ pub(super) fn stage(
         .collect()
 }
 
-fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
+/// A table that a stage reads chunk by chunk.
+struct LongTable(PublishedTable);
+
+impl StoredTable for LongTable {
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+    fn frame(&self) -> Result<Frame> {
+        self.0.frame()
+    }
+    fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+        self.0.chunks(take)
+    }
+}
+
+fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, Input)>>> {
     let stages = &state.plan.stages;
     let inputs = stages[index].inputs.iter();
     inputs
         .map(|input| {
-            let frames = input.from.iter().map(|origin| {
+            let tables = input.from.iter().map(|origin| {
                 let from = &stages[origin.stage];
                 let tables = state.tables[origin.stage].as_ref();
                 let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
-                Ok((from.id.clone(), store.load(run_state::table(tables, from, origin.port)?)?))
+                let table = run_state::table(tables, from, origin.port)?;
+                let input: Input = match input.port.chunked {
+                    true => Box::new(LongTable(store.published(table)?)),
+                    false => Box::new(store.load(table)?),
+                };
+                Ok((from.id.clone(), input))
             });
-            frames.collect()
+            tables.collect()
         })
         .collect()
 }

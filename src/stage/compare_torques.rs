@@ -3,8 +3,8 @@
 use crate::dynamics::{ContactEvent, DiagnosedRecording, TorqueChange, TorqueModel, changes};
 use crate::error::{Error, Result, counted};
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::torque_signal::torque_recording;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::torque_signal::RecordedTorques;
+use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{ArmMotion, Contacts, Robot, TorqueChangeTable, TorqueParameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,10 +18,10 @@ reads! {
     /// Input ports of [`CompareTorques`].
     pub struct CompareTorquesReads {
         robot: Robot,
-        motion: ArmMotion,
+        motion: Chunks<ArmMotion>,
         parameters: TorqueParameters,
         contacts: Contacts,
-        earlier_motion: ArmMotion,
+        earlier_motion: Chunks<ArmMotion>,
         earlier_parameters: TorqueParameters,
         earlier_contacts: Contacts,
     }
@@ -36,12 +36,12 @@ writes! {
 impl Stage for CompareTorques {
     const NAME: &'static str = "compare_torques";
     const SUMMARY: &'static str = "tests what changed between two recordings of an arm's torques: payload, friction, offsets";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = CompareTorquesReads;
     type Writes = CompareTorquesWrites;
 
     fn run(&self, reads: CompareTorquesReads, context: &Context) -> Result<CompareTorquesWrites> {
-        if reads.motion.time == reads.earlier_motion.time && reads.motion.q == reads.earlier_motion.q {
+        if same_motion(&reads.motion, &reads.earlier_motion)? {
             let message = "both recordings are the same: name the earlier one's stages, e.g. `reads: {earlier_motion: before, \
                            earlier_parameters: first, earlier_contacts: first}`";
             return Err(Error::spec("reads", message));
@@ -53,8 +53,8 @@ impl Stage for CompareTorques {
         if !whole(&first) {
             arm.links = None;
         }
-        let (earlier, _) = torque_recording(reads.earlier_motion, &robot, Vec::new())?;
-        let (later, _) = torque_recording(reads.motion, &robot, Vec::new())?;
+        let earlier = RecordedTorques::of(&reads.earlier_motion, &robot)?;
+        let later = RecordedTorques::of(&reads.motion, &robot)?;
         let (first_events, second_events) = (reads.earlier_contacts.events(), reads.contacts.events());
         let diagnosed = |recording, model, events| DiagnosedRecording { recording, model, events };
         let found = changes(&arm, &diagnosed(&earlier, &first, &first_events), &diagnosed(&later, &second, &second_events))?;
@@ -75,6 +75,19 @@ impl Stage for CompareTorques {
         let previous = |name: &str| reads.earlier_parameters.0.iter().find(|row| row.name == name).map(|row| row.value);
         Ok(CompareTorquesWrites { changes: TorqueChangeTable::of(&found, previous) })
     }
+}
+
+/// Whether two motions are equal as far as their first chunks go, and as long.
+fn same_motion(one: &Chunks<ArmMotion>, other: &Chunks<ArmMotion>) -> Result<bool> {
+    let first = |motion: &Chunks<ArmMotion>| {
+        let mut first = None;
+        motion.each(|chunk| {
+            first.get_or_insert((chunk.time, chunk.q));
+            Ok(())
+        })?;
+        Ok::<_, Error>(first)
+    };
+    Ok(one.rows() == other.rows() && first(one)? == first(other)?)
 }
 
 fn sentence(change: &TorqueChange) -> String {

@@ -1,16 +1,17 @@
 //! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
 
-use crate::dynamics::{TorqueQuestion, diagnose};
+use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::dynamic_arm::dynamic_arm;
-use crate::stage::torque_signal::torque_recording;
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::torque_signal::{HeldOut, RecordedTorques};
+use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueCovariance,
     TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals, TorqueVerdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Settings of `diagnose_torques`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -83,7 +84,7 @@ reads! {
     /// Input ports of [`DiagnoseTorques`].
     pub struct DiagnoseTorquesReads {
         robot: Robot,
-        motion: ArmMotion,
+        motion: Chunks<ArmMotion>,
     }
 }
 writes! {
@@ -107,7 +108,7 @@ writes! {
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -145,7 +146,7 @@ impl Stage for DiagnoseTorques {
             arm.links = None;
         }
         let held_out = self.held_out(&reads.motion, context)?;
-        let (recording, sequence) = torque_recording(reads.motion, &robot, held_out)?;
+        let recording = RecordedTorques::of(&reads.motion, &robot)?.holding_out(held_out);
         let enforce_bodies = self.consistency == ConsistencySetting::Enforce;
         if enforce_bodies && arm.links.is_none() {
             let message = "`enforce` needs declared masses, and the robot file lacks some: base parameters stand for many arms";
@@ -160,13 +161,14 @@ impl Stage for DiagnoseTorques {
         };
         let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
         diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
+        let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
-            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.from_current),
+            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.from_current()),
             findings: TorqueFindings::of(&diagnosis),
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),
             joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints, &sequence),
+            course: TorqueCourse::of(&diagnosis, recording.joints(), sequence),
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
@@ -177,33 +179,74 @@ impl Stage for DiagnoseTorques {
     }
 }
 
+/// What is known of a motion before its rows are held out.
+#[derive(Default)]
+struct MotionLabels {
+    /// s, of the first row.
+    start: f64,
+    labelled: bool,
+    /// Labels of what rows are for.
+    usages: Vec<String>,
+    /// Stretches of the recording.
+    stretches: BTreeSet<i64>,
+}
+
+impl MotionLabels {
+    fn of(motion: &Chunks<ArmMotion>) -> Result<Self> {
+        let (mut labels, mut first) = (Self::default(), true);
+        motion.each(|chunk| {
+            if std::mem::take(&mut first) {
+                labels.start = chunk.time.first().copied().unwrap_or_default();
+            }
+            labels.labelled |= chunk.usage.iter().any(Option::is_some);
+            let fresh: Vec<String> = chunk.usages.iter().filter(|label| !labels.usages.contains(label)).cloned().collect();
+            labels.usages.extend(fresh);
+            labels.stretches.extend(&chunk.trajectory);
+            Ok(())
+        })?;
+        Ok(labels)
+    }
+}
+
+/// Numbers of some rows, which ascend, in the table of motion.
+fn sequences(motion: &Chunks<ArmMotion>, rows: &[usize]) -> Result<Vec<i64>> {
+    let (mut first, mut sequences) = (0, Vec::with_capacity(rows.len()));
+    motion.each(|chunk| {
+        let own = &rows[sequences.len()..];
+        let own = &own[..own.partition_point(|row| *row < first + chunk.rows())];
+        sequences.extend(own.iter().map(|row| chunk.sequence[row - first]));
+        first += chunk.rows();
+        Ok(())
+    })?;
+    Ok(sequences)
+}
+
 impl DiagnoseTorques {
     /// Which rows judge in the end. Fails where none is left to fit.
-    fn held_out(&self, motion: &ArmMotion, context: &Context) -> Result<Vec<bool>> {
-        let rows = motion.rows();
-        let last = |share: f64| {
-            let first = rows - (share * rows as f64).round() as usize;
-            (0..rows).map(|row| row >= first).collect::<Vec<bool>>()
+    fn held_out(&self, motion: &Chunks<ArmMotion>, context: &Context) -> Result<Box<HeldOut<'_>>> {
+        let (rows, labels) = (motion.rows(), MotionLabels::of(motion)?);
+        let last = |share: f64| -> Box<HeldOut<'_>> {
+            let held_from = rows - (share * rows as f64).round() as usize;
+            Box::new(move |_, first, row| first + row >= held_from)
         };
-        let labelled = motion.usage.iter().any(Option::is_some);
-        let held_out = match &self.hold_out {
+        let held_out: Box<HeldOut<'_>> = match &self.hold_out {
             Some(HoldOut::Last(share)) => last(*share),
             Some(HoldOut::Trajectories(all)) => {
-                if let Some(missing) = all.iter().find(|one| !motion.trajectory.contains(one)) {
-                    let most = motion.trajectory.last().copied().unwrap_or_default();
+                if let Some(missing) = all.iter().find(|one| !labels.stretches.contains(one)) {
+                    let most = labels.stretches.last().copied().unwrap_or_default();
                     let message = format!("there is no stretch {missing}; the recording has 1 to {most}");
                     return Err(Error::data("with.hold_out.trajectories", message));
                 }
-                motion.trajectory.iter().map(|one| all.contains(one)).collect()
+                Box::new(|chunk, _, row| all.contains(&chunk.trajectory[row]))
             }
             Some(HoldOut::EverySecond(n)) => {
-                let start = motion.time.first().copied().unwrap_or_default();
-                motion.time.iter().map(|time| (time - start).rem_euclid(f64::from(*n)) >= f64::from(*n) - 1.0).collect()
+                let (start, n) = (labels.start, f64::from(*n));
+                Box::new(move |chunk, _, row| (chunk.time[row] - start).rem_euclid(n) >= n - 1.0)
             }
-            None if labelled => {
-                let fitted: Vec<bool> = motion.usages.iter().map(|label| self.on.contains(label)).collect();
-                motion.usage.iter().map(|usage| !usage.is_some_and(|usage| fitted[usize::from(usage)])).collect()
-            }
+            None if labels.labelled => Box::new(|chunk, _, row| {
+                let label = chunk.usage[row].and_then(|usage| chunk.usages.get(usize::from(usage)));
+                !label.is_some_and(|label| self.on.contains(label))
+            }),
             None => {
                 context
                     .services
@@ -211,10 +254,18 @@ impl DiagnoseTorques {
                 last(LAST)
             }
         };
-        let judging = held_out.iter().filter(|held| **held).count();
+        let (mut judging, mut first) = (0, 0);
+        motion.each(|chunk| {
+            judging += (0..chunk.rows()).filter(|row| held_out(&chunk, first, *row)).count();
+            first += chunk.rows();
+            Ok(())
+        })?;
         if judging == rows {
-            let labels = motion.usages.join(", ");
-            let message = format!("no row is left to fit; labels of the recording: {labels}; to fit: {}", self.on.join(", "));
+            let message = format!(
+                "no row is left to fit; labels of the recording: {}; to fit: {}",
+                labels.usages.join(", "),
+                self.on.join(", ")
+            );
             return Err(Error::data("with.on", message));
         }
         context.services.note(format!("{} to fit, {judging} held out", counted((rows - judging) as u64, "row")));

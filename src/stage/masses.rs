@@ -1,4 +1,5 @@
-//! `masses`: the robot with the masses that its torques show, so that what depends on gravity rests on them from here on.
+//! `masses`: the robot with the masses and the dry friction that its torques show, so that what depends on gravity, and on which side a
+//! joint comes to rest, rests on them from here on.
 
 use crate::dynamics::LinkFromTorques;
 use crate::error::Result;
@@ -32,8 +33,8 @@ writes! {
 
 impl Stage for Masses {
     const NAME: &'static str = "masses";
-    const SUMMARY: &'static str = "gives the robot of later stages the masses and centres that its torques show";
-    const IMPLEMENTATION: u32 = 1;
+    const SUMMARY: &'static str = "gives the robot of later stages the masses, centres and dry friction that its torques show";
+    const IMPLEMENTATION: u32 = 2;
     type Reads = MassesReads;
     type Writes = MassesWrites;
 
@@ -53,6 +54,10 @@ impl Stage for Masses {
                 robot.inertias.links[index] = Some([i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]]);
             }
         }
+        for (joint, friction) in robot.joints.iter_mut().zip(model.coulomb()) {
+            joint.coulomb = friction;
+        }
+        context.services.note(told_of_friction(&model.coulomb()));
         if !(0..links.len()).all(|link| model.is_whole(link)) {
             context.services.note(
                 "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared"
@@ -62,6 +67,17 @@ impl Stage for Masses {
         context.services.note("what the tool carried beyond the declared payload is part of the last link from here on".into());
         Ok(MassesWrites { robot: Robot::from_description(&robot) })
     }
+}
+
+/// Friction of the joints.
+fn told_of_friction(friction: &[Option<f64>]) -> String {
+    let of = |friction: &Option<f64>| friction.map_or_else(|| "none found".into(), |friction| format!("{friction:.3} Nm"));
+    let all: Vec<String> = friction.iter().map(of).collect();
+    format!(
+        "dry friction of joints 1 to {} by the torques: {}; below it approach decides on which side a joint rests",
+        all.len(),
+        all.join(", ")
+    )
 }
 
 /// What changes of a link.

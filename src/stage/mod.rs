@@ -35,6 +35,7 @@ mod screened;
 mod simulate;
 pub mod split;
 mod stiffness;
+mod stored;
 mod text_file;
 mod torque_signal;
 mod transfer;
@@ -59,6 +60,7 @@ pub use report_torques::{ReportTorques, ReportTorquesReads, ReportTorquesWrites}
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
+pub use stored::{Chunks, Input, StoredTable};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
@@ -89,16 +91,20 @@ pub struct Port {
     pub kind: &'static str,
     /// How many tables it takes.
     pub arity: Arity,
+    /// Whether its table is read chunk by chunk.
+    pub chunked: bool,
 }
 
-/// What a field of a `reads!` struct may be: `T`, `Option<T>` or `Vec<From<T>>`.
+/// What a field of a `reads!` struct may be: `T`, `Option<T>`, `Vec<Labelled<T>>` or `Chunks<T>`.
 pub trait PortValue: Sized {
     /// How many tables it takes.
     const ARITY: Arity;
     /// The name of the schema.
     const KIND: &'static str;
-    /// The value from the frames that were wired to the port.
-    fn take(frames: Vec<(String, Frame)>) -> Result<Self>;
+    /// Whether it is read chunk by chunk.
+    const CHUNKED: bool = false;
+    /// The value from the tables that were wired to the port.
+    fn take(inputs: Vec<(String, Input)>) -> Result<Self>;
 }
 
 /// A table together with the id of the stage that wrote it.
@@ -113,22 +119,22 @@ pub struct Labelled<T> {
 impl<T: Table> PortValue for T {
     const ARITY: Arity = Arity::One;
     const KIND: &'static str = T::KIND;
-    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
-        T::from_frame(&frames.first().expect("the plan wired this port").1)
+    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+        T::from_frame(&inputs.first().expect("the plan wired this port").1.frame()?)
     }
 }
 impl<T: Table> PortValue for Option<T> {
     const ARITY: Arity = Arity::Optional;
     const KIND: &'static str = T::KIND;
-    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
-        frames.first().map(|(_, frame)| T::from_frame(frame)).transpose()
+    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+        inputs.first().map(|(_, input)| T::from_frame(&input.frame()?)).transpose()
     }
 }
 impl<T: Table> PortValue for Vec<Labelled<T>> {
     const ARITY: Arity = Arity::Every;
     const KIND: &'static str = T::KIND;
-    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
-        frames.into_iter().map(|(stage, frame)| Ok(Labelled { stage, table: T::from_frame(&frame)? })).collect()
+    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+        inputs.into_iter().map(|(stage, input)| Ok(Labelled { stage, table: T::from_frame(&input.frame()?)? })).collect()
     }
 }
 
@@ -136,8 +142,8 @@ impl<T: Table> PortValue for Vec<Labelled<T>> {
 pub trait Reads: Sized {
     /// In the order of the fields.
     fn ports() -> Vec<Port>;
-    /// Takes the frames of each port, in the order of [`Reads::ports`].
-    fn take(frames: Vec<Vec<(String, Frame)>>) -> Result<Self>;
+    /// Takes the tables of each port, in the order of [`Reads::ports`].
+    fn take(inputs: Vec<Vec<(String, Input)>>) -> Result<Self>;
 }
 
 /// The output ports of a stage.
@@ -166,12 +172,12 @@ macro_rules! reads {
         )* }
         impl crate::stage::Reads for $name {
             fn ports() -> Vec<crate::stage::Port> {
-                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY } ),* ]
+                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY, chunked: <$ty as crate::stage::PortValue>::CHUNKED } ),* ]
             }
             #[allow(unused_mut, unused_variables)]
-            fn take(frames: Vec<Vec<(String, crate::table::Frame)>>) -> crate::error::Result<Self> {
-                let mut frames = frames.into_iter();
-                Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(frames.next().expect("one entry per port"))?, )* })
+            fn take(inputs: Vec<Vec<(String, crate::stage::Input)>>) -> crate::error::Result<Self> {
+                let mut inputs = inputs.into_iter();
+                Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
             }
         }
     };
@@ -201,7 +207,7 @@ macro_rules! writes {
         )* }
         impl crate::stage::Writes for $name {
             fn ports() -> Vec<crate::stage::Port> {
-                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::Produced>::KIND, arity: crate::stage::Arity::One } ),* ]
+                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::Produced>::KIND, arity: crate::stage::Arity::One, chunked: false } ),* ]
             }
             fn give(self) -> crate::error::Result<Vec<crate::stage::Output>> {
                 Ok(vec![ $( crate::stage::Produced::give(self.$field)? ),* ])

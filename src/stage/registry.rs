@@ -1,8 +1,7 @@
 //! Stages without their types, so that a pipeline can hold any of them.
 
-use super::{Context, Output, Port, RawFile, Reads, Stage, Writes};
+use super::{Context, Input, Output, Port, RawFile, Reads, Stage, Writes};
 use crate::error::{Fault, Result};
-use crate::table::Frame;
 use crate::yaml::{Node, Trouble, typed};
 use schemars::{Schema, SchemaGenerator};
 
@@ -18,10 +17,10 @@ pub trait ErasedStage: Send + Sync {
     fn sets_dealt(&self) -> Option<Vec<String>>;
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
-    /// As [`Stage::look`], with the frames of each input port where all are known.
-    fn look(&self, frames: Option<Vec<Vec<(String, Frame)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
-    /// Takes the frames of each input port with the ids of the stages that wrote them.
-    fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>>;
+    /// As [`Stage::look`], with the tables of each input port where all are known.
+    fn look(&self, inputs: Option<Vec<Vec<(String, Input)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
+    /// Takes the tables of each input port with the ids of the stages that wrote them.
+    fn run(&self, inputs: Vec<Vec<(String, Input)>>, context: &Context) -> Result<Vec<Output>>;
 }
 
 impl<T: Stage> ErasedStage for T {
@@ -40,12 +39,12 @@ impl<T: Stage> ErasedStage for T {
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("settings are plain data")
     }
-    fn look(&self, frames: Option<Vec<Vec<(String, Frame)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
-        let reads = frames.map(T::Reads::take).transpose()?;
+    fn look(&self, inputs: Option<Vec<Vec<(String, Input)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
+        let reads = inputs.map(T::Reads::take).transpose()?;
         Stage::look(self, reads, context)?.map(Writes::give).transpose()
     }
-    fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>> {
-        Stage::run(self, T::Reads::take(frames)?, context)?.give()
+    fn run(&self, inputs: Vec<Vec<(String, Input)>>, context: &Context) -> Result<Vec<Output>> {
+        Stage::run(self, T::Reads::take(inputs)?, context)?.give()
     }
 }
 

@@ -10,7 +10,7 @@ use super::content::TableHash;
 use super::disk::{make_read_only, place, refused, write};
 use super::frame::Frame;
 use super::key::{ActionId, StageKey};
-use super::reader;
+use super::reader::{self, PublishedTable};
 use super::seal::{seal, unseal};
 use super::table_ref::{TableRef, same_bytes};
 use super::writer::{FinishedFile, TableWriter};
@@ -180,6 +180,11 @@ impl Store {
     /// Reads a published table.
     pub fn load(&self, table: &TableRef) -> Result<Frame> {
         reader::load(&self.object(table)?, table)
+    }
+
+    /// The same, to be read chunk by chunk.
+    pub fn published(&self, table: &TableRef) -> Result<PublishedTable> {
+        PublishedTable::open(self.object(table)?, table.clone())
     }
 
     /// Whether the file of a published table is there, byte for byte.

@@ -2,8 +2,8 @@
 
 use arrow::array::{ArrayRef, RecordBatch};
 use arrow::compute::concat_batches;
-use arrow::datatypes::{Field, Schema};
-use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use arrow::datatypes::{Field, Schema, SchemaRef};
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::file::reader::ChunkReader;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -34,22 +34,9 @@ impl Decoded {
 
     fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         let text = |error: &dyn std::fmt::Display| error.to_string();
-        // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options).map_err(|error| text(&error))?;
-        let pairs = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
-        let said: BTreeMap<String, String> = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
-        let units: BTreeMap<String, String> =
-            said.get(UNITS).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-        let schema = builder.schema().clone();
-        let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(|error| text(&error))?;
+        let DecodedChunks { said, schema, file_schema, reader, .. } = DecodedChunks::parse(source)?;
         let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| text(&error))?;
-        let batch = concat_batches(&schema, &batches).map_err(|error| text(&error))?;
-        let with_unit = |field: &Arc<Field>| {
-            let unit = units.get(field.name()).map(|unit| ("unit".to_string(), unit.clone()));
-            field.as_ref().clone().with_metadata(unit.into_iter().collect())
-        };
-        let schema = Arc::new(Schema::new(schema.fields().iter().map(with_unit).collect::<Vec<_>>()));
+        let batch = concat_batches(&file_schema, &batches).map_err(|error| text(&error))?;
         let batch = RecordBatch::try_new(schema, batch.columns().to_vec()).map_err(|error| text(&error))?;
         Ok(Self { said, batch })
     }
@@ -83,6 +70,56 @@ impl Decoded {
             frame.push(name, column);
         }
         frame.finish()
+    }
+}
+
+/// A file decoded chunk by chunk.
+pub(super) struct DecodedChunks {
+    said: BTreeMap<String, String>,
+    /// With the units of columns, and as Parquet has it.
+    schema: SchemaRef,
+    file_schema: SchemaRef,
+    reader: ParquetRecordBatchReader,
+    begun: bool,
+}
+
+impl DecodedChunks {
+    /// Opens a file, or says why that cannot be.
+    pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        raw::decoded(|| Self::parse(source)).and_then(|parsed| parsed)
+    }
+
+    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        let text = |error: &dyn std::fmt::Display| error.to_string();
+        // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options).map_err(|error| text(&error))?;
+        let pairs = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+        let said: BTreeMap<String, String> = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+        let units: BTreeMap<String, String> =
+            said.get(UNITS).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+        let file_schema = builder.schema().clone();
+        let with_unit = |field: &Arc<Field>| {
+            let unit = units.get(field.name()).map(|unit| ("unit".to_string(), unit.clone()));
+            field.as_ref().clone().with_metadata(unit.into_iter().collect())
+        };
+        let schema = Arc::new(Schema::new(file_schema.fields().iter().map(with_unit).collect::<Vec<_>>()));
+        let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(|error| text(&error))?;
+        Ok(Self { said, schema, file_schema, reader, begun: false })
+    }
+
+    /// The next rows; of a file without rows, once none.
+    pub fn next(&mut self) -> Result<Option<Decoded>, String> {
+        let batch = raw::decoded(|| self.reader.next().transpose())?.map_err(|error| error.to_string())?;
+        let first = !std::mem::replace(&mut self.begun, true);
+        let batch = match batch {
+            Some(batch) => {
+                RecordBatch::try_new(self.schema.clone(), batch.columns().to_vec()).map_err(|error| error.to_string())?
+            }
+            None if first => RecordBatch::new_empty(self.schema.clone()),
+            None => return Ok(None),
+        };
+        Ok(Some(Decoded { said: self.said.clone(), batch }))
     }
 }
 

@@ -35,7 +35,7 @@ pub use bucket::Bucket;
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
 pub(crate) use reader::table_of_bytes;
-pub use reader::{Loose, read_table};
+pub use reader::{Loose, PublishedTable, read_table};
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
 pub use table_ref::TableRef;

@@ -3,9 +3,9 @@
 use parquet::file::reader::ChunkReader;
 use std::fs::{self, File};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::decode::Decoded;
+use super::decode::{Decoded, DecodedChunks};
 use super::disk::refused;
 use super::frame::Frame;
 use super::key::FileHash;
@@ -25,17 +25,60 @@ pub struct Loose<T> {
     pub vouched: bool,
 }
 
-/// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
-pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
-    let place = path.display().to_string();
-    let (kind, version) = known_schema(&place, &table.schema)?;
+/// Opens a published table whose bytes are those that were published; another file is set aside, so that the next run makes it anew.
+fn open_published(path: &Path, table: &TableRef) -> Result<File> {
     let open = || File::open(path).map_err(|e| unopened(path, &e));
     let found = FileHash::of_reader(open()?).map_err(|e| refused(path, "read", &e))?;
     if found != table.file_hash {
         return Err(set_aside(path, "its bytes are not those that were published"));
     }
+    open()
+}
+
+/// A published table that is read chunk by chunk: its bytes were those that were published when it was opened.
+pub struct PublishedTable {
+    path: PathBuf,
+    table: TableRef,
+}
+
+impl PublishedTable {
+    pub(super) fn open(path: PathBuf, table: TableRef) -> Result<Self> {
+        known_schema(&path.display().to_string(), &table.schema)?;
+        open_published(&path, &table)?;
+        Ok(Self { path, table })
+    }
+
+    /// How many rows.
+    pub fn rows(&self) -> usize {
+        self.table.rows as usize
+    }
+
+    /// All of it.
+    pub fn frame(&self) -> Result<Frame> {
+        load(&self.path, &self.table)
+    }
+
+    /// Hands on all rows in their order; of a table without rows, one empty chunk. Fails where the file cannot be read.
+    pub fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
+        let place = self.path.display().to_string();
+        let (kind, version) = known_schema(&place, &self.table.schema)?;
+        let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
+        let file = File::open(&self.path).map_err(|e| unopened(&self.path, &e))?;
+        let mut chunks = DecodedChunks::of(file).map_err(unreadable)?;
+        while let Some(chunk) = chunks.next().map_err(unreadable)? {
+            take(&chunk.frame(kind, version)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
+pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
+    let place = path.display().to_string();
+    let (kind, version) = known_schema(&place, &table.schema)?;
+    let file = open_published(path, table)?;
     let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
-    let decoded = Decoded::of(open()?).map_err(unreadable)?;
+    let decoded = Decoded::of(file).map_err(unreadable)?;
     if decoded.rows() != table.rows {
         return Err(set_aside(path, "it has another number of rows than was published"));
     }

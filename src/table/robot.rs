@@ -54,6 +54,8 @@ crate::table::rows! { "robot",
         tolerance_mass: Option<f64>,
         tolerance_centre_mm: Option<f64>,
         tolerance_inertia: Option<f64>,
+        /// Joints only: dry friction, where torques have shown it.
+        coulomb_nm: Option<f64>,
     }
 }
 
@@ -145,6 +147,7 @@ fn joint_row(index: usize, joint: &JointDescription, couplings: &[Coupling]) -> 
     row.reduction_ratio = joint.reduction_ratio;
     row.motor_constant_nm_a = joint.motor_constant;
     row.mass_kg = joint.mass;
+    row.coulomb_nm = joint.coulomb;
     [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm] = millimetres(joint.centre);
     let mine = couplings.iter().filter(|c| c.moved == index);
     let cells: Vec<_> = mine.map(|c| CouplingCell { by: c.by + 1, ratio: c.ratio }).collect();
@@ -174,6 +177,7 @@ fn joint(row: &RobotRow) -> Result<JointDescription> {
         reduction_ratio: row.reduction_ratio,
         motor_constant: row.motor_constant_nm_a,
         mass: row.mass_kg,
+        coulomb: row.coulomb_nm,
         centre: if centre == [None; 3] { None } else { Some(metres(centre, row, "centre")?) },
     })
 }
@@ -259,6 +263,7 @@ fn empty(body: usize, name: &str, kind: &str) -> RobotRow {
         tolerance_mass: None,
         tolerance_centre_mm: None,
         tolerance_inertia: None,
+        coulomb_nm: None,
     }
 }
 

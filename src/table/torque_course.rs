@@ -31,12 +31,12 @@ pub struct TorqueCourse {
 }
 
 impl TorqueCourse {
-    /// The courses of a diagnosis; `sequence` numbers the rows of the recording.
-    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: &[i64]) -> Self {
+    /// The courses of a diagnosis; `sequence` numbers its rows.
+    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: Vec<i64>) -> Self {
         let courses = &diagnosis.courses;
         Self {
             joints,
-            sequence: courses.row.iter().map(|row| sequence[*row]).collect(),
+            sequence,
             time: courses.time.clone(),
             held_out: courses.held_out.clone(),
             in_event: courses.in_event.clone(),

@@ -45,7 +45,7 @@ struct TermForm {
 const LINKS: &str = "rigid_body";
 const SEEN: &str = "recording";
 /// Of a joint's range, in the order of [`ends`].
-const RANGE: [(&str, &str); 7] = [
+const RANGE: [(&str, &str); 8] = [
     ("position_least", "rad"),
     ("position_greatest", "rad"),
     ("speed_greatest", "rad/s"),
@@ -53,16 +53,17 @@ const RANGE: [(&str, &str); 7] = [
     ("load_greatest", "Nm"),
     ("misfit", "Nm"),
     ("u95_usual", "Nm"),
+    ("sign_width", "rad/s"),
 ];
-/// Of the recording as a whole: width of a sign, latency, cut-off.
-const WHOLE: [(&str, &str); 3] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz")];
+/// Of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
+const WHOLE: [(&str, &str); 4] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz"), ("friction_lead", "s")];
 
 /// Where it was recorded, C.
 const TEMPERATURE: [&str; 2] = ["temperature_least", "temperature_greatest"];
 
-fn ends(range: &JointRange) -> [f64; 7] {
-    let [lowest, highest] = range.position;
-    [lowest, highest, range.speed, range.acceleration, range.load, range.misfit, range.usual]
+fn ends(range: &JointRange) -> [f64; 8] {
+    let [least, greatest] = range.position;
+    [least, greatest, range.speed, range.acceleration, range.load, range.misfit, range.usual, range.sign_width]
 }
 
 fn fault(message: String) -> Error {
@@ -104,7 +105,18 @@ impl TorqueParameters {
                 rows.push(TorqueParameterRow { name, effect, place, quantity, value: *value, unit, sigma, rms_nm, form });
             }
         }
+        for term in &model.terms {
+            for (value, (name, unit, sigma)) in term.shape_numbers()?.into_iter().zip(numbers.by_ref()) {
+                let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
+                let (effect, place) = (term.effect.clone(), term.place.to_string());
+                rows.push(TorqueParameterRow { name, effect, place, quantity, value, unit, sigma, rms_nm: None, form: None });
+            }
+        }
         rows.extend(seen(model));
+        // The last number of the covariance is the width of a sign.
+        if let Some((name, _, sigma)) = numbers.next() {
+            rows.iter_mut().filter(|row| row.name == name).for_each(|row| row.sigma = sigma);
+        }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(rows))
     }
@@ -123,6 +135,8 @@ impl TorqueParameters {
             sign_width: self.value(&format!("{SEEN}.{}", WHOLE[0].0))?,
             latency: self.value(&format!("{SEEN}.{}", WHOLE[1].0))?,
             cutoff: self.value(&format!("{SEEN}.{}", WHOLE[2].0))?,
+            // Tables of before it was written say nothing of it.
+            friction_lead: self.value(&format!("{SEEN}.{}", WHOLE[3].0)).unwrap_or(0.0),
             range: (1..=joints).map(|joint| self.range(joint)).collect::<Result<_>>()?,
             temperature: self.temperature(),
         };
@@ -137,7 +151,8 @@ impl TorqueParameters {
             model.identified[INERTIAL_NUMBERS * link + number] = true;
         }
         let mut terms: BTreeMap<&str, Vec<&TorqueParameterRow>> = BTreeMap::new();
-        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN) {
+        // Shape numbers are in the form of each coefficient.
+        for row in self.0.iter().filter(|row| row.effect != LINKS && row.effect != SEEN && row.form.is_some()) {
             let prefix = row.name.strip_suffix(row.quantity.as_str()).unwrap_or(&row.name);
             terms.entry(prefix).or_default().push(row);
         }
@@ -156,8 +171,9 @@ impl TorqueParameters {
         // Tables of before these were written say nothing of them.
         let [load, misfit, usual] = [(RANGE[4].0, f64::INFINITY), (RANGE[5].0, 0.0), (RANGE[6].0, 0.0)]
             .map(|(quantity, unknown)| of(quantity).unwrap_or(unknown));
+        let sign_width = of(RANGE[7].0).or_else(|_| self.value(&format!("{SEEN}.{}", WHOLE[0].0)))?;
         let position = [least?, greatest?];
-        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load, misfit, usual })
+        Ok(JointRange { position, speed: speed?, acceleration: acceleration?, load, misfit, usual, sign_width })
     }
 
     fn temperature(&self) -> Option<[f64; 2]> {
@@ -179,7 +195,7 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         rms_nm: None,
         form: None,
     };
-    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff]);
+    let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff, model.friction_lead]);
     let whole = whole.map(|(named, value)| row(format!("{SEEN}.{}", named.0), Place::Recording, *named, value));
     let ranges = model.range.iter().enumerate().flat_map(|(joint, range)| {
         let of = move |(named, value): (&(&'static str, &'static str), f64)| {

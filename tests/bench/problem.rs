@@ -72,6 +72,7 @@ impl Case {
             motor_constant: None,
             mass: joint["mass"].as_f64(),
             centre: Some(vector(&joint["centre"])),
+            coulomb: None,
         });
         let couplings = robot["couplings"].as_array().expect("couplings").iter().map(|coupling| Coupling {
             moved: coupling["moved"].as_u64().expect("moved") as usize,

@@ -2,7 +2,7 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
+    Context, ErasedStage, Input, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
 use calib::table::Table;
@@ -19,6 +19,8 @@ pub struct Desk {
     files: BTreeMap<PathBuf, Vec<u8>>,
     pub notes: Mutex<Vec<String>>,
     pub warnings: Mutex<Vec<String>>,
+    /// Names of files, each time that one is opened.
+    pub opened: Mutex<Vec<String>>,
     chunks: Chunks,
 }
 
@@ -39,7 +41,9 @@ impl Desk {
         stage: &dyn ErasedStage,
         frames: Vec<Vec<(String, Frame)>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
-        self.written(&(entry.writes)(), |context| stage.run(frames, context))
+        let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as Input);
+        let inputs = frames.into_iter().map(|port| port.into_iter().map(input).collect()).collect();
+        self.written(&(entry.writes)(), |context| stage.run(inputs, context))
     }
     fn written(
         &self,
@@ -87,6 +91,7 @@ impl Sink for Keep {
 impl Services for Desk {
     fn open(&self, file: &RawFile) -> Result<OpenedInput> {
         let label = file.0.display().to_string();
+        self.opened.lock().unwrap().push(label.clone());
         if let Some(content) = self.files.get(&file.0) {
             let reader = Box::new(std::io::Cursor::new(content.clone()));
             return Ok(OpenedInput { label, reader, size: Some(content.len() as u64) });

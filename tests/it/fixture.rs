@@ -23,6 +23,7 @@ fn robot(name: &str, chain: Chain, tool_mm: [f64; 3], masses: &[f64]) -> RobotDe
                 motor_constant: Some(1.0),
                 mass: Some(masses[j]),
                 centre: Some(centre),
+                coulomb: None,
             }
         })
         .collect();

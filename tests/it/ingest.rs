@@ -8,6 +8,7 @@ mod kinds;
 mod later;
 mod moving;
 mod noise;
+mod once;
 mod programs;
 mod refusals;
 mod together;
@@ -57,6 +58,7 @@ pub fn robot(kinds: &str, half_turns: f64) -> Robot {
         tolerance_mass: None,
         tolerance_centre_mm: None,
         tolerance_inertia: None,
+        coulomb_nm: None,
     };
     Robot(kinds.chars().zip(1..).map(row).collect())
 }

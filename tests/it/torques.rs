@@ -4,6 +4,7 @@ mod changes;
 mod concealed;
 mod excite;
 mod feed_forward;
+mod friction;
 mod hostile;
 mod masses;
 mod results;

@@ -37,6 +37,7 @@ fn lever() -> RobotDescription {
             motor_constant: Some(0.5),
             mass: Some(0.0),
             centre: Some([0.0; 3]),
+            coulomb: None,
         }],
         tool: [2.0, 0.0, 0.0],
         tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

@@ -3,11 +3,19 @@
 
   pip install mujoco numpy
   mujoco_torques.py DIR [--seed 1] [--cases 60]
-  for case in DIR/*; do calib diagnose pipelines/dynamics/pipeline.yaml --set case=$case --json; done
+  mujoco_torque_marks.py DIR --calib BINARY
 
 Three arms (5, 6 and 7 turning joints), 100 to 500 Hz, sums of sines and moves from point to point, steps of the encoders, noise of the
-currents. Each folder has robot.json and recording.csv (what a user has) and want.json (what MuJoCo's model has besides). Every joint has
-MuJoCo's damping and dry friction; one further cause is hidden in four of five recordings. Torques are those of mj_inverse.
+currents. Each folder has robot.json and recording.csv (what a user has) and want.json (what MuJoCo's model has besides, L of the hidden cause
+and the names that data cannot tell from it). Every joint has MuJoCo's damping and dry friction; one further cause is hidden in four of five
+recordings.
+
+Of four recordings two have MuJoCo's `frictionloss` as a model has it by default: a soft constraint whose torque is -loss * clip((a + b v) /
+(R loss)), with b = 2 / (0.95 * 0.02 s) by solref and solimp. It turns as the sign of v + a / b does: 9.5 ms before the velocity, and over a
+width of R loss / b of its own at each joint. In one of these the arm is simulated forward: a controller of positions (8 Hz, damping 0.8,
+torques of the rigid arm, none against friction) drives it 1000 times a second, joints stick at rest and where they turn, and the torque
+commanded in a step is logged with the position at its beginning. In all others torques are those of mj_inverse along the planned motion, and
+in two of four dry friction is a gear's, that turns with the velocity alone.
 """
 
 import argparse
@@ -16,6 +24,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from mujoco_visible import STEP, visible
 
 Z, Y, X = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]
 # Axes, points (m) and masses (kg) of the links.
@@ -28,7 +37,9 @@ ARMS = {
 }
 CAUSES = ["rotor_inertia", "cable_stiffness", "link_mass", "link_com", "payload_error", "gravity_direction", "contact", "torque_constant",
           "current_offset", "current_latency", "torque_ripple", "warmup_friction"]
-FINE = 1000  # Hz of the simulation.
+FINE = 500  # Hz of the motion.
+SUBSTEPS = 2  # Of the forward simulation in a step of the motion.
+PACE = 2 * np.pi * 8  # rad/s, of the controller.
 
 
 def rod(mass, span):
@@ -60,7 +71,7 @@ def number(like, value):
     return [value] + [0.0] * (len(like) - 1) if np.ndim(like) else value
 
 
-def model_of(arm, friction, armature, stiffness, springref):
+def model_of(arm, damping, loss, armature, stiffness, springref):
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = arm["gravity"]
@@ -84,9 +95,9 @@ def model_of(arm, friction, armature, stiffness, springref):
         body.mass, body.ipos, body.explicitinertial = mass, centre - point, True
         body.fullinertia = [m[0], m[3], m[5], m[1], m[2], m[4]]
         joint = body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
-        joint.armature, joint.springref = armature[k], springref
+        joint.armature, joint.springref, joint.frictionloss = armature[k], springref, loss[k]
         # Polynomials since MuJoCo 4.
-        joint.damping = number(joint.damping, friction[0][k])
+        joint.damping = number(joint.damping, damping[k])
         joint.stiffness = number(joint.stiffness, stiffness[k])
     return spec.compile()
 
@@ -128,7 +139,7 @@ def hidden(cause, arm, rng, peak):
     joint, link, sign = int(rng.integers(n)), int(rng.integers(1, n - 1)), rng.choice([-1, 1])
     place = f"joint {joint + 1}"
     if cause == "rotor_inertia":
-        told["armature"][joint] = peak[joint] * rng.uniform(0.05, 0.1)
+        told["armature"][joint] = peak[joint] * rng.uniform(0.02, 0.05)
     elif cause == "cable_stiffness":
         told["stiffness"][joint], told["springref"] = peak[joint] * rng.uniform(0.06, 0.15), rng.uniform(-1, 1)
     elif cause == "link_mass":
@@ -159,7 +170,7 @@ def hidden(cause, arm, rng, peak):
     elif cause == "current_offset":
         told["offset"] = sign * peak[joint] * rng.uniform(0.05, 0.1)
     elif cause == "current_latency":
-        told["late"], place = rng.uniform(0.008, 0.02), "recording"
+        told["late"], place = rng.integers(4, 11) / FINE, "recording"
     elif cause == "torque_ripple":
         told["ripple"] = (peak[joint] * rng.uniform(0.03, 0.06), int(rng.integers(2, 7)), rng.uniform(0, 6.2))
     elif cause == "warmup_friction":
@@ -168,29 +179,71 @@ def hidden(cause, arm, rng, peak):
     return real, told
 
 
-def torques(model, arm, q, told, begin, friction):
-    v, a = np.gradient(q, 1 / FINE, axis=0), None
-    a = np.gradient(v, 1 / FINE, axis=0)
+def rows_of(q, step):
+    v = np.gradient(q, step, axis=0)
+    return q, v, np.gradient(v, step, axis=0)
+
+
+def torques(model, arm, motion, told, begin, friction):
+    """Torques of a motion: of the bodies, damping and dry friction, of what is hidden, of the drives."""
+    q, v, a = motion
     data = mujoco.MjData(model)
-    out, last = np.zeros_like(q), model.nbody - 1
-    joint = told["joint"]
+    out, dry, last = np.zeros_like(q), np.zeros_like(q), model.nbody - 1
+    joint, t = told["joint"], begin + np.arange(len(q)) / FINE
     for row in range(len(q)):
-        time = begin + row / FINE
         data.qpos[:], data.qvel[:], data.qacc[:] = q[row], v[row], a[row]
         mujoco.mj_inverse(model, data)
-        out[row] = data.qfrc_inverse
-        if "force" in told and told["start"] < time < told["end"]:
-            push = told["force"] * np.sin(np.pi * (time - told["start"]) / (told["end"] - told["start"]))
+        out[row], dry[row] = data.qfrc_inverse, -data.qfrc_constraint
+        if "force" in told and told["start"] < t[row] < told["end"]:
+            push = told["force"] * np.sin(np.pi * (t[row] - told["start"]) / (told["end"] - told["start"]))
             at = data.xpos[last] + data.xmat[last].reshape(3, 3) @ (arm["tool"] - arm["points"][-1])
             jac = np.zeros((3, q.shape[1]))
             mujoco.mj_jac(model, data, jac, None, at, last)
             out[row] -= jac.T @ push
-    # MuJoCo's frictionloss also depends on acceleration, over a width that its solver chooses: no dry friction of a gear.
-    out += friction[1] * np.tanh(v / 0.01)
-    t = begin + np.arange(len(q)) / FINE
+    if not model.dof_frictionloss.any():
+        dry = friction[1] * np.tanh(v / 0.01)
+        out += dry
     if "warm" in told:
         share, lasts = told["warm"]
-        out[:, joint] += share * np.exp(-t / lasts) * (friction[0][joint] * v[:, joint] + friction[1][joint] * np.tanh(v[:, joint] / 0.01))
+        out[:, joint] += share * np.exp(-t / lasts) * (friction[0][joint] * v[:, joint] + dry[:, joint])
+    return logged(out, q, told)
+
+
+def driven(model, arm, motion, told, begin, friction):
+    """Torques that a controller commands, and where the arm then is."""
+    q, v, a = motion
+    model.opt.timestep = 1 / (FINE * SUBSTEPS)
+    data, joint, last = mujoco.MjData(model), told["joint"], model.nbody - 1
+    data.qpos[:], data.qvel[:] = q[0], v[0]
+    out, where, mass, loss = np.zeros_like(q), np.zeros_like(q), np.zeros((model.nv, model.nv)), model.dof_frictionloss.copy()
+    jac = np.zeros((3, model.nv))
+    for step in range(len(q) * SUBSTEPS):
+        row, share = divmod(step, SUBSTEPS)
+        now, after = [part[row] for part in motion], [part[min(row + 1, len(q) - 1)] for part in motion]
+        aim, speed, pull = [one + (other - one) * share / SUBSTEPS for one, other in zip(now, after)]
+        time = begin + step * model.opt.timestep
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, mass)
+        wanted = pull + PACE**2 * (aim - data.qpos) + 1.6 * PACE * (speed - data.qvel)
+        command = mass @ wanted + data.qfrc_bias
+        if share == 0:
+            out[row], where[row] = command, data.qpos
+        data.qfrc_applied[:] = command
+        if "warm" in told:
+            more = told["warm"][0] * np.exp(-time / told["warm"][1])
+            model.dof_frictionloss[joint] = (1 + more) * loss[joint]
+            data.qfrc_applied[joint] -= more * friction[0][joint] * data.qvel[joint]
+        if "force" in told and told["start"] < time < told["end"]:
+            at = data.xpos[last] + data.xmat[last].reshape(3, 3) @ (arm["tool"] - arm["points"][-1])
+            mujoco.mj_jac(model, data, jac, None, at, last)
+            data.qfrc_applied += jac.T @ told["force"] * np.sin(np.pi * (time - told["start"]) / (told["end"] - told["start"]))
+        mujoco.mj_step(model, data)
+    return where, logged(out, where, told)
+
+
+def logged(out, q, told):
+    """Torques as the drives log them."""
+    joint = told["joint"]
     if "ripple" in told:
         size, order, phase = told["ripple"]
         out[:, joint] += size * np.sin(order * q[:, joint] + phase)
@@ -202,31 +255,46 @@ def torques(model, arm, q, told, begin, friction):
 
 def case(folder, number, seed):
     rng = np.random.default_rng([seed, number])
-    name = list(ARMS)[number % 3]
+    name = list(ARMS)[(number + number // 15) % 3]
     arm = declared(name, rng)
     n, rate = len(arm["axes"]), int(rng.choice([100, 125, 200, 250, 500]))
-    nothing = (np.zeros(n), np.zeros(n))
+    nothing, soft = np.zeros(n), number % 4 < 2
     motions = [sines(rng, n, 16), moves(rng, n, 12), sines(rng, n, 10), moves(rng, n, 8)]
-    bare = model_of(arm, nothing, np.zeros(n), np.zeros(n), 0.0)
-    peak = np.abs(torques(bare, arm, motions[0][::10], {"joint": 0}, 0.0, nothing)).max(axis=0)
+    motions = [rows_of(q, 1 / FINE) for q in motions]
+    bare = model_of(arm, nothing, nothing, nothing, nothing, 0.0)
+    peak = np.abs(torques(bare, arm, [part[::10] for part in motions[0]], {"joint": 0}, 0.0, (nothing, nothing))).max(axis=0)
     peak = np.maximum(peak, 0.02 * peak.max())
-    cause = CAUSES[number // 3 % len(CAUSES)] if number % 5 else None
+    cause = CAUSES[(number - number // 5 - 1) % len(CAUSES)] if number % 5 else None
     real, told = hidden(cause, arm, rng, peak)
     scatter = lambda sigma, shape: sigma * np.clip(rng.normal(size=shape), -2, 2)
-    real["masses"] = real["masses"] * (1 + scatter(0.01, n))
-    real["centres"] = real["centres"] + scatter(0.004, (n, 3))
+    mass, centre = 1 + scatter(0.01, n), scatter(0.004, (n, 3))
     friction = (peak * rng.uniform(0.04, 0.1, n), peak * rng.uniform(0.05, 0.12, n))
-    model = model_of(real, friction, told["armature"], told["stiffness"], told["springref"])
+
+    def built(own, beside):
+        """MuJoCo's model of an arm, with what no user knows of it."""
+        own = {**own, "masses": own["masses"] * mass, "centres": own["centres"] + centre}
+        loss = friction[1] if soft else nothing
+        return model_of(own, friction[0], loss, beside.get("armature", nothing), beside.get("stiffness", nothing), beside.get("springref", 0.0))
+
+    begins = np.cumsum([0.0] + [len(q) / FINE + 2.0 for q, _, _ in motions])
+
+    def clean(own, beside, by, count):
+        """What `by` makes of motions, without noise."""
+        return [by(built(own, beside), own, motion, beside, begin, friction) for motion, begin in zip(motions[:count], begins)]
+
+    if number % 4 == 1:
+        places, torque = zip(*clean(real, told, driven, 4))
+    else:
+        places, torque = [q for q, _, _ in motions], clean(real, told, torques, 4)
     ratio, constant = np.full(n, 100.0), np.maximum(peak / 100.0 / 8.0, 1e-3)
     encoder, every = 360.0 / 2**18, FINE // rate
-    noise = 0.01 * peak
+    noise = 0.02 * peak
     lines = ["time_s,traj,use," + ",".join(f"q{j + 1}_deg" for j in range(n)) + "," + ",".join(f"i{j + 1}_a" for j in range(n))]
     begin = 0.0
-    for stretch, q in enumerate(motions):
-        torque = torques(model, real, q, told, begin, friction)
+    for stretch, q in enumerate(places):
         for row in range(0, len(q), every):
             angle = np.round(np.degrees(q[row]) / encoder) * encoder
-            current = (torque[row] + noise * rng.normal(size=n)) / (ratio * constant)
+            current = (torque[stretch][row] + noise * rng.normal(size=n)) / (ratio * constant)
             cells = [f"{begin + row / FINE:.4f}", str(stretch + 1), "fit" if stretch < 2 else "validate"]
             lines.append(",".join(cells + [f"{x:.5f}" for x in angle] + [f"{np.round(x / 0.002) * 0.002:.3f}" for x in current]))
         begin += len(q) / FINE + 2.0
@@ -240,12 +308,16 @@ def case(folder, number, seed):
     effects = [{"effect": f, "where": f"joint {j + 1}", "hidden": False} for j in range(n) for f in ("viscous_friction", "coulomb_friction")]
     if cause:
         numbers = {k: (np.array(v).tolist()) for k, v in told.items() if k in ("start", "end", "mass", "gain", "offset", "late")}
-        effects.insert(0, {"effect": cause, "where": told["place"], "hidden": True, **numbers})
+        with_it = clean(real, told, torques, 2)
+        effect = np.vstack(with_it) - np.vstack(clean(arm, {"joint": told["joint"]}, torques, 2))
+        fitted = [np.vstack([motion[k] for motion in motions[:2]]) for k in range(3)]
+        seen = visible(effect, np.vstack(with_it), fitted, arm, noise / np.sqrt(STEP * rate / FINE), lambda own: model_of(own, *4 * [nothing], 0.0))
+        effects.insert(0, {"effect": cause, "where": told["place"], "hidden": True, **seen, **numbers})
     where = folder / f"mujoco_{number:03}"
     where.mkdir(parents=True, exist_ok=True)
     (where / "robot.json").write_text(json.dumps(robot, indent=1) + "\n")
     (where / "recording.csv").write_text("\n".join(lines) + "\n")
-    (where / "want.json").write_text(json.dumps({"rate": rate, "effects": effects}, indent=1) + "\n")
+    (where / "want.json").write_text(json.dumps({"rate": rate, "friction": ["frictionloss", "frictionloss, driven", "gear", "gear"][number % 4], "effects": effects}, indent=1) + "\n")
 
 
 def main():

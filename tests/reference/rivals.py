@@ -5,7 +5,8 @@
     OMP_NUM_THREADS=1 venv/bin/python tests/reference/rivals.py --calib target/release/calib --seed 1 --cases 60 --work DIR [--json FILE]
 
 `calib simulate conceal` makes half of the recordings with `--families library` (a fifth without any effect, a fifth with two, a tenth in no
-list), half with `--families beyond` (an eighth without any effect). Every program gets the folder of a recording and nothing else, learns from
+list), half with `--families beyond` (an eighth without any effect). `--worlds "left out" foreign` asks of physics in no list instead: of one cause a
+recording, which calib's own list lacks (`without`), and of effects drawn at random (`--foreign 1`). Every program gets the folder of a recording and nothing else, learns from
 the rows that the recording says are to fit, and foretells the others. The answers are opened afterwards.
 
 The rivals start from the same identified geometry (rivals_arm.py: base, tool, links, ratios and couplings by least squares, rows grossly off left
@@ -22,7 +23,9 @@ PySINDy, laws   the same with a library of laws at every place (rivals_sparse.py
 gplearn         symbolic regression of one function of a place's variables at a time (rivals_curves.py lists them: joints, tilts, links, base, tool,
                 tracker). Evolved on 65 % of the rows, judged on the others; up to four functions. Place: that of the function. Name: from the variables
                 that matter when shuffled and from the shape (a line in the load is wind-up, a step in time a shift, a sine of the joint a gear).
+calib, whole list  the same with the cause that was left out back in the list: what the true model leaves; where nothing was left out, calib again.
 GP              the same with a Gaussian process of scikit-learn's ARD kernel; length scales by marginal likelihood, judged in four folds.
+GP at the place the same, and told the place of the effect: nothing is left to find but the function, over the variables of the place.
 prototype       the Python program that calib grew out of, if `--prototype` names its folder: it prints the same JSON as `calib diagnose`.
 
 PySR is not among them: it downloads Julia when it is first imported. Not named by gplearn and GP: a wrong mass, a lagging log. Marks are of recordings:
@@ -49,18 +52,24 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 POINT_FAULTS = {"outlier", "mislabelled_point"}
 DUE = 50
-FAMILIES = {"library": ["--nulls", "0.2", "--pairs", "0.2", "--open", "0.1"], "beyond": ["--nulls", "0.125"]}
-METHODS = ["calib", "PySINDy, plain", "PySINDy, laws", "gplearn", "GP", "prototype"]
+FAMILIES = {
+    "library": ["--nulls", "0.2", "--pairs", "0.2", "--open", "0.1"],
+    "beyond": ["--nulls", "0.125"],
+    "left out": ["--faulty", "0"],
+    "foreign": ["--foreign", "1", "--faulty", "0"],
+}
+METHODS = ["calib", "calib, whole list", "PySINDy, plain", "PySINDy, laws", "gplearn", "GP", "GP at the place", "prototype"]
 
 
 def make(arguments):
     """The folders of the recordings with their sealed answers."""
     out = []
-    for i, (families, more) in enumerate(FAMILIES.items()):
-        folder = arguments.work / families
+    for i, families in enumerate(arguments.worlds):
+        folder = arguments.work / families.replace(" ", "_")
         if not folder.exists():
-            cases = (arguments.cases + 1 - i) // 2
-            command = [arguments.calib, "simulate", "conceal", "--out", folder, "--families", families, "--seed", arguments.seed, "--cases", cases, *more]
+            cases = (arguments.cases + len(arguments.worlds) - 1 - i) // len(arguments.worlds)
+            drawn_from, more = families if families == "beyond" else "library", FAMILIES[families]
+            command = [arguments.calib, "simulate", "conceal", "--out", folder, "--families", drawn_from, "--seed", arguments.seed, "--cases", cases, *more]
             subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
         out += [(families, case, folder / "sealed" / f"{case.name}.json") for case in sorted((folder / "recordings").iterdir())]
     return out
@@ -73,9 +82,13 @@ def children():
     return used.ru_utime + used.ru_stime
 
 
-def calib(case, arguments):
-    with tempfile.TemporaryDirectory(dir=arguments.work) as store:
-        run = [arguments.calib, "run", ROOT / "pipelines/case/pipeline.yaml", "--set", f"case={case}", "--store", store]
+def calib(case, arguments, without):
+    with tempfile.TemporaryDirectory(dir=arguments.work) as folder:
+        store = pathlib.Path(folder) / "store"
+        text = (ROOT / "pipelines/case/pipeline.yaml").read_text()
+        pipeline = pathlib.Path(folder) / "pipeline.yaml"
+        pipeline.write_text(text.replace("  - uses: diagnose\n", f"  - uses: diagnose\n    with: {{without: {json.dumps(without)}}}\n") if without else text)
+        run = [arguments.calib, "run", pipeline, "--set", f"case={case}", "--store", store]
         subprocess.run(run, check=True, capture_output=True)
         spent = children()
 
@@ -87,13 +100,13 @@ def calib(case, arguments):
     return findings, (sum(e * e for e in errors) / len(errors))**0.5, spent
 
 
-def prototype(case, arguments):
+def prototype(case, arguments, _without):
     run = subprocess.run([sys.executable, arguments.prototype / "diagnose.py", case, "--json"], check=True, capture_output=True, timeout=600)
     said = json.loads(run.stdout)
     return [(f["effect"], f["where"]) for f in said["findings"]], said["after"]["validate_rms_mm"], children()
 
 
-def in_process(method, case, seed):
+def in_process(method, case, seed, places):
     import numpy as np
     import rivals_curves
     import rivals_sparse
@@ -105,6 +118,7 @@ def in_process(method, case, seed):
         "PySINDy, laws": lambda: rivals_sparse.sparse(rigid, rng, rivals_sparse.library),
         "gplearn": lambda: rivals_curves.symbolic(rigid, rng),
         "GP": lambda: rivals_curves.gaussian_process(rigid, rng),
+        "GP at the place": lambda: rivals_curves.gaussian_process(rigid, rng, places=places),
     }[method]()
     return findings, rigid.error(shift)
 
@@ -114,10 +128,10 @@ def one(job):
     (families, case, sealed), number, arguments = job
     kept = arguments.work / f"{families}-{case.name}.json"
     out = json.loads(kept.read_text()) if kept.exists() else {"families": families, "case": case.name, "answers": {}}
+    truth = json.loads(sealed.read_text())
     for method in arguments.only:
         if method not in out["answers"]:
-            out["answers"][method] = ask(method, case, number, arguments)
-    truth = json.loads(sealed.read_text())
+            out["answers"][method] = ask(method, case, number, arguments, truth, families)
     out["causes"] = [[e["effect"], e["where"], e["form"], round(e["L"], 1)] for e in truth["effects"] if e["wanted"]]
     for answer in out["answers"].values():
         answer["marks"] = mark(truth, answer)
@@ -125,15 +139,18 @@ def one(job):
     return out
 
 
-def ask(method, case, seed, arguments):
+def ask(method, case, seed, arguments, truth, families):
+    """What a program says. Of the truth `calib` is told which causes its list shall lack, and `GP at the place` the places, nobody else anything."""
     try:
-        if method in ("calib", "prototype"):
+        wanted = [effect for effect in truth["effects"] if effect["wanted"]]
+        if method in ("calib", "calib, whole list", "prototype"):
             before = children()
-            findings, held, after = (calib if method == "calib" else prototype)(case, arguments)
+            without = sorted({e["effect"] for e in wanted}) if families == "left out" and method == "calib" else []
+            findings, held, after = (prototype if method == "prototype" else calib)(case, arguments, without)
             cpu = after - before
         else:
             before = time.process_time()
-            findings, held = in_process(method, case, seed)
+            findings, held = in_process(method, case, seed, {e["where"] for e in wanted})
             cpu = time.process_time() - before
         return {"findings": findings, "held_mm": held, "cpu_s": cpu}
     except Exception as fault:  # a program that gives up has said nothing; it is counted
@@ -212,6 +229,7 @@ def main():
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="where recordings and answers are made; those that are there are kept")
     parser.add_argument("--prototype", type=pathlib.Path, help="folder of the Python prototype's diagnose.py; without it that line is left out")
+    parser.add_argument("--worlds", nargs="*", default=["library", "beyond"], choices=list(FAMILIES))
     parser.add_argument("--only", nargs="*", default=METHODS, choices=METHODS)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=pathlib.Path, help="every finding and mark")
@@ -230,8 +248,9 @@ def main():
             for method, a in result["answers"].items():
                 held = "-" if a["marks"]["ratio"] is None else f"{a['marks']['ratio']:.3f}"
                 print(f"    {method:15} {held:>7} {a.get('cpu_s', 0):5.1f} s", a.get("failed", a.get("findings")), file=sys.stderr, flush=True)
-    versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "scikit-learn", "pysindy", "gplearn")}
-    for title in [None, *FAMILIES]:
+    installed = {found.metadata["Name"]: found.version for found in importlib.metadata.distributions()}
+    versions = {name: installed[name] for name in ("numpy", "scipy", "scikit-learn", "pysindy", "gplearn") if name in installed}
+    for title in [None, *arguments.worlds]:
         some = [r for r in results if title in (None, r["families"])]
         print(f"\n{title or 'all'}: {len(some)} recordings\n\n{table(some, arguments.only)}")
     print("\n" + ", ".join(f"{name} {version}" for name, version in versions.items()))

@@ -163,8 +163,9 @@ def process_round(rigid, all_channels, found, rng, certain, last):
     return best and (best[1], best[2]), scores
 
 
-def gaussian_process(rigid, rng, certain=3.0, rounds=4):
-    return forward(rigid, rng, certain, rounds, process_round)
+def gaussian_process(rigid, rng, certain=3.0, rounds=4, places=None):
+    """At any place, or only at some: joints tilt, too, and the link behind a joint is at its place."""
+    return forward(rigid, rng, certain, rounds, process_round, places)
 
 
 # ---- symbolic regression
@@ -219,9 +220,9 @@ def symbolic(rigid, rng, certain=3.0, rounds=4):
 
 # ---- both
 
-def forward(rigid, rng, certain, rounds, one_round):
+def forward(rigid, rng, certain, rounds, one_round, places=None):
     """Adds functions while rows that were not used to learn them are foretold better."""
-    all_channels = [channel for channel in channels(rigid) if channel.names]
+    all_channels = [channel for channel in channels(rigid) if channel.names and (places is None or is_at(channel.place, places))]
     found, findings, last = [], [], range(len(all_channels))
     for _ in range(rounds):
         step, scores = one_round(rigid, all_channels, found, rng, certain, last)
@@ -235,6 +236,12 @@ def forward(rigid, rng, certain, rounds, one_round):
         found.append(channel.direction * f[:, None])
         last = sorted(scores, key=scores.get)[:12]
     return findings, explained(rigid, np.stack(found, -1) if found else np.zeros((*rigid.residual.shape, 0)))
+
+
+def is_at(place, places):
+    """Whether a channel acts at one of some places; what acts along a link acts at the joints that it joins."""
+    number = lambda name: {int(part) for part in name.partition(" ")[2].split("-") if part.isdigit()}
+    return place in places or any(name.startswith("link") and number(place) and min(number(name)) <= min(number(place)) <= max(number(name)) + 1 for name in places)
 
 
 def importance(channel, function, rng):

@@ -70,6 +70,9 @@ pub(super) struct ConcealArguments {
     /// Share of recordings with an effect that is in no list
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     open: f64,
+    /// Share of recordings with a foreign effect: drawn at random, any motion over any variable
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    foreign: f64,
     /// Share of effects in another form than the obvious one
     #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
     other_forms: f64,
@@ -152,6 +155,7 @@ fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
         ("--nulls", arguments.nulls),
         ("--pairs", arguments.pairs),
         ("--open", arguments.open),
+        ("--foreign", arguments.foreign),
         ("--other-forms", arguments.other_forms),
         ("--natural", arguments.natural),
         ("--faulty", arguments.faulty),
@@ -159,8 +163,8 @@ fn shares(arguments: &ConcealArguments) -> Vec<Fault> {
     let wrong = shares.into_iter().filter(|(_, share)| !(0.0..=1.0).contains(share));
     let mut faults: Vec<Fault> =
         wrong.map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1"))).collect();
-    if arguments.nulls + arguments.pairs + arguments.open > 1.0 + 1e-9 {
-        faults.push(Fault::new("--nulls, --pairs, --open", "add up to more than 1"));
+    if arguments.nulls + arguments.pairs + arguments.open + arguments.foreign > 1.0 + 1e-9 {
+        faults.push(Fault::new("--nulls, --pairs, --open, --foreign", "add up to more than 1"));
     }
     faults
 }
@@ -173,6 +177,9 @@ fn torques(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         if !(least..=most).contains(&value) {
             faults.push(Fault::new(option, format!("{value}; allowed: {least} to {most}")));
         }
+    }
+    if arguments.foreign > 0.0 {
+        faults.push(Fault::new("--foreign", "foreign effects move points; torques have none"));
     }
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
@@ -195,9 +202,9 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         Families::Library => Collection::Library,
         Families::Beyond => Collection::Beyond,
     };
-    if collection == Collection::Beyond && arguments.pairs + arguments.open > 0.0 {
+    if collection == Collection::Beyond && arguments.pairs + arguments.open + arguments.foreign > 0.0 {
         faults.push(Fault::new(
-            "--pairs, --open",
+            "--pairs, --open, --foreign",
             "need `--families library`; with `--families beyond` every recording has one cause",
         ));
     }
@@ -247,7 +254,7 @@ fn points(arguments: &ConcealArguments) -> Result<ConcealedSet> {
         nulls: arguments.nulls,
         pairs: arguments.pairs,
         open: arguments.open,
-        foreign: 0.0,
+        foreign: arguments.foreign,
         other_forms: arguments.other_forms,
         natural: arguments.natural,
         faulty: arguments.faulty,

@@ -1,7 +1,8 @@
 //! What a model leaves of the rows, against their noise.
 
 use super::types::Question;
-use super::verdict_statement::Ground;
+use super::words::Ground;
+use crate::criteria::noise::{LOUD, TOO_LOUD};
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_brought};
@@ -31,11 +32,6 @@ pub(crate) struct Misfit {
     /// Rms size of what is left at held-out rows that belong, where it is more than what was fitted and the noise allow.
     pub not_carried: Option<f64>,
 }
-
-/// A residual this much larger than the noise, in mean square, does not agree with it: where it has structure it is not explained ...
-pub(crate) const LOUD: f64 = 1.25;
-/// ... and this much larger it is not whatever it looks like.
-pub(crate) const TOO_LOUD: f64 = 2.5;
 
 /// What is left of all that a row measured.
 struct RowMisfit {
@@ -85,7 +81,7 @@ impl Misfit {
         let freedom = values(kept).saturating_sub(parameters).max(1) as f64;
         // Rows that were not fitted also see the errors of what was.
         let inflation = 1.0 + parameters as f64 / freedom;
-        let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * values(&judges) as f64;
+        let not_carried = held_out && whitened(&judges) > *TOO_LOUD * inflation * values(&judges) as f64;
         let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
         let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();
@@ -118,7 +114,7 @@ impl Misfit {
     pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize, nameless: bool) -> Ground {
         Ground {
             dimension: self.dimension,
-            agrees: self.chi_square <= LOUD,
+            agrees: self.chi_square <= *LOUD,
             not_carried: self.not_carried,
             nameless,
             partly_nameless: false,

@@ -3,6 +3,7 @@
 use super::pool::{CachedHypotheses, HypothesisSet};
 use super::round::compliance;
 use super::whitened::WhitenedProblem;
+use crate::criteria::search::RIVAL_LEVELS;
 use crate::effect::{
     Cause, DeclaredCause, DeclaredForm, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown,
     hypotheses, whole,
@@ -11,9 +12,6 @@ use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, Contest};
 use crate::robot::Measurements;
 use std::collections::BTreeSet;
-
-/// Levels of refinement of a rival's shape.
-const LEVELS: i32 = 8;
 
 /// A diagnosed model where it stands.
 pub struct DiagnosedModel<'a> {
@@ -50,7 +48,7 @@ pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&
     // As diagnosis names rivals: by what fits in place of the finding.
     let mut pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &open, 1.0, rivals));
     let Some((_, mut best)) = best(&pool, 0) else { return Err(format!("no form of {effect} at {place} can be tried")) };
-    for level in 0..LEVELS {
+    for level in 0..*RIVAL_LEVELS {
         let own = pool.hypotheses[best].clone();
         let near = own.form.near(&survey, level).into_iter().map(|form| Hypothesis { form, ..own.clone() });
         let first = pool.add(near.collect());

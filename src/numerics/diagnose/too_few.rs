@@ -2,10 +2,8 @@
 
 use super::types::{Diagnosis, Question, VerdictKind};
 use super::unasked::{on_its_base, unasked};
+use crate::criteria::search::FEWEST;
 use crate::estimate::{FitOptions, fit_screened};
-
-/// Fewest rows to fit: geometry alone takes some thirty parameters from three of each row.
-pub(crate) const FEWEST: usize = 15;
 
 /// The nominal robot with its base where the rows to fit have it.
 pub(crate) fn not_asked(question: &Question) -> Diagnosis {
@@ -13,7 +11,9 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let options = FitOptions { rows: question.fit, candidates: &candidates };
     let diagnosis = unasked(question, VerdictKind::NotAsked, fit_screened(&start, question.data, &options, question.set));
     let rows = question.fit.len();
-    let too_few =
-        format!("what the simulation lacks: {rows} rows were fitted, at least {FEWEST} are needed to separate it from geometry");
+    let too_few = format!(
+        "what the simulation lacks: {rows} rows were fitted, at least {} are needed to separate it from geometry",
+        *FEWEST
+    );
     Diagnosis { after: diagnosis.before, not_observable: vec![too_few], ..diagnosis }
 }

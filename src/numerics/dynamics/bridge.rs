@@ -1,9 +1,8 @@
 //! Rows that were lost one or a few at a time: made up between their neighbours, so that filters go on over them.
 
+use super::clock::ClockPace;
 use super::recording::TorqueRecording;
 use crate::error::counted;
-use crate::statistics::nearest;
-use std::borrow::Cow;
 
 /// Rows lost in a row, at most; a longer gap ends a stretch.
 const MOST: usize = 5;
@@ -11,19 +10,25 @@ const MOST: usize = 5;
 const AROUND: usize = 2;
 
 /// A recording without small gaps.
-pub(super) struct Bridged<'a> {
-    pub recording: Cow<'a, TorqueRecording>,
+pub(super) struct Bridged {
+    pub recording: TorqueRecording,
     /// Of each row: the recorded one, or the one before it where it is made up.
     pub origin: Vec<usize>,
 }
 
-impl<'a> Bridged<'a> {
+impl Bridged {
     /// Of a checked recording.
-    pub fn of(recording: &'a TorqueRecording) -> Self {
-        let lost = lost(recording);
+    pub fn of(recording: TorqueRecording) -> Self {
+        let usual = ClockPace::usual_step(&recording);
+        Self::by_steps(recording, usual)
+    }
+
+    /// Of rows that usually come every so many s.
+    pub fn by_steps(recording: TorqueRecording, usual: f64) -> Self {
+        let lost = lost(&recording, usual);
         let rows = recording.rows();
         if lost.is_empty() {
-            return Self { recording: Cow::Borrowed(recording), origin: (0..rows).collect() };
+            return Self { recording, origin: (0..rows).collect() };
         }
         let mut origin = Vec::with_capacity(rows + lost.iter().map(|(_, count)| count).sum::<usize>());
         // Of each row: how far it is from its origin to the next recorded row, as a share, and steps of the clock between these.
@@ -40,7 +45,7 @@ impl<'a> Bridged<'a> {
         }
         let between = |values: &[f64], width: usize| -> Vec<f64> {
             let row = |(row, (share, steps)): (&usize, &(f64, f64))| {
-                let weights = weights(recording, *row, *share, *steps);
+                let weights = weights(&recording, *row, *share, *steps);
                 (0..width).map(move |entry| weights.iter().map(|(at, weight)| weight * values[at * width + entry]).sum())
             };
             origin.iter().zip(&shares).flat_map(row).collect()
@@ -57,15 +62,13 @@ impl<'a> Bridged<'a> {
             held_out: origin.iter().map(|row| recording.held_out[*row]).collect(),
             from_current: recording.from_current,
         };
-        Self { recording: Cow::Owned(whole), origin }
+        Self { recording: whole, origin }
     }
+}
 
-    /// A sentence where rows are made up.
-    pub fn remark(&self, recorded: usize) -> Option<String> {
-        let made_up = self.recording.rows() - recorded;
-        (made_up > 0)
-            .then(|| format!("bridged between their neighbours: {} of the clock without a row", counted(made_up, "step")))
-    }
+/// A sentence where rows are made up.
+pub(super) fn remark(made_up: usize) -> Option<String> {
+    (made_up > 0).then(|| format!("bridged between their neighbours: {} of the clock without a row", counted(made_up, "step")))
 }
 
 /// Recorded rows with their weights of a row that is so far from one to the next: of the cubic through two on either side, since a straight
@@ -89,10 +92,8 @@ fn weights(recording: &TorqueRecording, row: usize, share: f64, steps: f64) -> V
 }
 
 /// Rows after which some are lost, and how many.
-fn lost(recording: &TorqueRecording) -> Vec<(usize, usize)> {
+fn lost(recording: &TorqueRecording, usual: f64) -> Vec<(usize, usize)> {
     let time = &recording.time;
-    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let usual = nearest(&mut steps, 0.5).unwrap_or(1.0);
     let after = |row: usize| {
         let (first, last) = (row.saturating_sub(AROUND), (row + 1 + AROUND).min(time.len() - 1));
         if recording.trajectory[first] != recording.trajectory[last] {
@@ -103,5 +104,5 @@ fn lost(recording: &TorqueRecording) -> Vec<(usize, usize)> {
         let count = here.min(around);
         (count >= 1.0 && count <= MOST as f64).then_some((row, count as usize))
     };
-    (0..time.len() - 1).filter_map(after).collect()
+    (0..time.len().saturating_sub(1)).filter_map(after).collect()
 }

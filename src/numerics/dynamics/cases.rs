@@ -49,14 +49,19 @@ type Row = (usize, f64, f64, f64, f64, f64);
 
 /// A recording of `real` with a torque added at each joint; torques come `latency` s late.
 pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
+    record_at(real, RATE, latency, extra)
+}
+
+/// The same at a rate, Hz.
+pub(super) fn record_at(real: &DynamicArm, rate: f64, latency: f64, extra: &dyn Fn(Row) -> f64) -> TorqueRecording {
     let n = real.joints();
     let theta = inertials::DeclaredInertials::of(real, real.links.as_deref().unwrap()).theta;
     let mut dynamics = InverseDynamics::new(real);
-    let rows = (DURATION * RATE) as usize;
+    let rows = (DURATION * rate) as usize;
     let mut dice = ChaCha8Rng::seed_from_u64(3);
     let mut recording = TorqueRecording {
         joints: n,
-        time: (0..rows).map(|row| row as f64 / RATE).collect(),
+        time: (0..rows).map(|row| row as f64 / rate).collect(),
         position: Vec::new(),
         velocity: None,
         torque: Vec::new(),
@@ -67,7 +72,7 @@ pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64
     };
     let mut torque = vec![0.0; n];
     for row in 0..rows {
-        let time = row as f64 / RATE;
+        let time = row as f64 / rate;
         recording.position.extend((0..n).map(|joint| moved(joint, time).0));
         let then = time - latency;
         let motion: Vec<(f64, f64, f64)> = (0..n).map(|joint| moved(joint, then)).collect();
@@ -85,7 +90,7 @@ pub(super) fn record(real: &DynamicArm, latency: f64, extra: &dyn Fn(Row) -> f64
 }
 
 /// Names with places, sorted.
-fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
+pub(super) fn found(diagnosis: &TorqueDiagnosis) -> Vec<String> {
     let mut names: Vec<String> = diagnosis.findings.iter().map(|f| format!("{} {}", f.effect, f.place)).collect();
     names.sort();
     names

@@ -3,14 +3,14 @@
 
 use super::arm::DynamicArm;
 use super::cause::{COULOMB, OFFSET, TORQUE_CAUSES, TorqueForm, VISCOUS};
-use super::clock::RecordingClock;
 use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
-use super::recording::TorqueRecording;
 use super::rich::noise_beside;
+use super::source::TorqueSource;
 use super::stacked::{CandidateColumns, StackedFit, StackedNormal};
 use super::types::{ContactEvent, TorqueQuestion};
+use super::used::UsedRecording;
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::estimate::tail;
@@ -27,7 +27,7 @@ const PAYLOAD: &str = "payload";
 /// A recording, the model that its diagnosis identified, and the pushes that it found.
 pub struct DiagnosedRecording<'a> {
     /// All rows are fitted, held-out ones too.
-    pub recording: &'a TorqueRecording,
+    pub recording: &'a dyn TorqueSource,
     /// Of this recording.
     pub model: &'a TorqueModel,
     /// Rows in which something touches the arm.
@@ -69,16 +69,15 @@ pub struct TorqueChanges {
 /// Compares two diagnosed recordings of an arm.
 ///
 /// # Errors
-/// [`crate::error::Error::Data`] where models and arm differ in joints, or a model has causes that are not known.
+/// [`crate::error::Error::Data`] where models and arm differ in joints, a model has causes that are not known, or a recording cannot be used.
 pub fn changes(arm: &DynamicArm, first: &DiagnosedRecording, second: &DiagnosedRecording) -> Result<TorqueChanges> {
     let n = arm.joints();
-    if [first, second].iter().any(|one| one.model.joints() != n || one.recording.joints != n) {
+    if [first, second].iter().any(|one| one.model.joints() != n || one.recording.joints() != n) {
         return Err(Error::data("models", format!("the arm has {n} joints, models or recordings others")));
     }
     let shared = shared_forms(first.model, second.model)?;
     let candidates = candidate_forms(&shared, n);
-    let clocks = [first, second].map(|one| RecordingClock::of(one.recording));
-    let mut problems = [(first, &clocks[0]), (second, &clocks[1])].map(|(one, clock)| prepared(arm, one, first.model, clock));
+    let mut problems = [prepared(arm, first, first.model)?, prepared(arm, second, first.model)?];
     let base = problems[0].all.base_changes.clone();
     problems
         .iter_mut()
@@ -128,17 +127,19 @@ fn candidate_forms(shared: &[TorqueForm], joints: usize) -> Vec<TorqueForm> {
 }
 
 /// A recording about the first model's masses, with the base alone as columns.
-fn prepared<'a>(arm: &'a DynamicArm, one: &DiagnosedRecording, about: &TorqueModel, clock: &RecordingClock) -> TorqueProblem<'a> {
-    let mut recording = one.recording.clone();
+fn prepared<'a>(arm: &'a DynamicArm, one: &DiagnosedRecording, about: &TorqueModel) -> Result<TorqueProblem<'a>> {
+    let UsedRecording { mut recording, clock, .. } = UsedRecording::of(arm, one.recording, Some(about.cutoff))?;
     recording.held_out.fill(false);
     let question = TorqueQuestion { free_inertials: arm.links.is_none(), ..TorqueQuestion::default() };
-    let mut problem = TorqueProblem::new(arm, &recording, &question, clock, about.cutoff);
-    problem.scene.sign_width = about.sign_width;
+    let mut problem = TorqueProblem::new(arm, recording, &question, &clock, about.cutoff);
+    problem.scene.turn_over(about.sign_width);
+    problem.scene.turn_each_over(about.range.iter().map(|range| range.sign_width));
+    problem.scene.friction_lead = about.friction_lead;
     problem.events = one.events.to_vec();
     problem.scene.believe(&about.inertials);
     let all: Vec<String> = TORQUE_CAUSES.iter().map(|cause| cause.name().to_string()).collect();
     problem.form(&all);
-    problem
+    Ok(problem)
 }
 
 /// Takes a base that both recordings have in common, and all candidates as columns.

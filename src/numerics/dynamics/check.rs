@@ -1,9 +1,9 @@
 //! Whether a recording can be used at all: each fault is said with its joint or row and what is allowed.
 
 use super::arm::DynamicArm;
-use super::bridge::Bridged;
 use super::check_gravity::gravity_faults;
 use super::clock::RecordingClock;
+use super::extremes::TorqueExtremes;
 use super::recording::TorqueRecording;
 use crate::error::{Error, Fault, Result};
 use crate::statistics::nearest;
@@ -23,10 +23,6 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const LEAST_RANGE: f64 = 0.1;
 /// m: points of an arm are nearer to the base.
 const FARTHEST: f64 = 50.0;
-/// Of rows at one extreme value: a torque that is cut off.
-const SATURATED: f64 = 0.02;
-/// Rows at least of those.
-const SATURATED_ROWS: usize = 40;
 /// Of the correlation of recorded and differentiated velocity.
 const SAME_VELOCITY: f64 = 0.5;
 
@@ -76,28 +72,9 @@ fn sizes(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
 fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let n = recording.joints;
     let mut faults = Vec::new();
-    let not_a_number =
-        |values: &[f64], each: usize| values.iter().position(|value| !value.is_finite()).map(|at| at / each.max(1));
-    for (name, values, each) in
-        [("time", &recording.time, 1), ("position", &recording.position, n), ("torque", &recording.torque, n)]
-    {
-        if let Some(row) = not_a_number(values, each) {
-            faults.push(fault(name, format!("row {}: not a finite number", row + 1)));
-        }
-    }
+    faults.extend(row_faults(recording, 0, None));
     if !faults.is_empty() {
         return faults;
-    }
-    for row in 1..recording.rows() {
-        let back = recording.time[row] <= recording.time[row - 1];
-        if back && recording.trajectory[row] == recording.trajectory[row - 1] {
-            let times = [recording.time[row - 1], recording.time[row]];
-            faults.push(fault(
-                "time",
-                format!("row {}: the clock goes from {} s to {} s; it must ascend", row + 1, times[0], times[1]),
-            ));
-            return faults;
-        }
     }
     let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual = nearest(&mut steps, 0.5).unwrap_or(0.0);
@@ -115,8 +92,10 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
         faults.push(fault("points", format!("{far:.0} m from the base: lengths are in m (millimetres?)")));
     }
     let ranges: Vec<f64> = (0..n).map(|joint| range(recording, joint)).collect();
+    let mut extremes = TorqueExtremes::new(n);
+    extremes.push(&recording.torque);
     for (joint, range) in ranges.iter().enumerate() {
-        faults.extend(joint_faults(arm, recording, joint, *range));
+        faults.extend(joint_faults(arm, recording, &extremes, joint, *range));
     }
     let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
@@ -140,36 +119,51 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     faults
 }
 
+/// Numbers that are none, and a clock that does not ascend, in rows that begin at row `first` of the recording, after one of this time and
+/// trajectory.
+pub(super) fn row_faults(rows: &TorqueRecording, first: usize, before: Option<(f64, u32)>) -> Vec<Fault> {
+    let n = rows.joints.max(1);
+    let not_a_number = |(name, values, each): (&'static str, &Vec<f64>, usize)| {
+        let at = values.iter().position(|value| !value.is_finite())?;
+        Some(fault(name, format!("row {}: not a finite number", first + at / each + 1)))
+    };
+    let columns = [("time", &rows.time, 1), ("position", &rows.position, n), ("torque", &rows.torque, n)];
+    let faults: Vec<Fault> = columns.into_iter().filter_map(not_a_number).collect();
+    if !faults.is_empty() {
+        return faults;
+    }
+    let all = || rows.time.iter().copied().zip(rows.trajectory.iter().copied());
+    let pairs = before.into_iter().chain(all()).zip(all().skip(usize::from(before.is_none())));
+    let row = first + usize::from(before.is_none()) + 1;
+    let back = |(row, ((then, from), (now, to))): (usize, ((f64, u32), (f64, u32)))| {
+        let message = || format!("row {row}: the clock goes from {then} s to {now} s; it must ascend");
+        (now <= then && from == to).then(|| fault("time", message()))
+    };
+    (row..).zip(pairs).find_map(back).into_iter().collect()
+}
+
 fn range(recording: &TorqueRecording, joint: usize) -> f64 {
     let positions = || recording.position.iter().skip(joint).step_by(recording.joints);
     positions().copied().fold(f64::NEG_INFINITY, f64::max) - positions().copied().fold(f64::INFINITY, f64::min)
 }
 
-fn joint_faults(arm: &DynamicArm, recording: &TorqueRecording, joint: usize, range: f64) -> Vec<Fault> {
-    let (n, name) = (recording.joints, format!("joint {}", joint + 1));
+fn joint_faults(
+    arm: &DynamicArm,
+    recording: &TorqueRecording,
+    extremes: &TorqueExtremes,
+    joint: usize,
+    range: f64,
+) -> Vec<Fault> {
+    let name = format!("joint {}", joint + 1);
     let mut faults = Vec::new();
     if range > WIDEST && !arm.prismatic[joint] {
         faults.push(fault(&name, format!("positions span {range:.0} rad: angles are in rad (degrees?)")));
     }
-    let torques: Vec<f64> = recording.torque.iter().skip(joint).step_by(n).copied().collect();
-    let (least, most) =
-        torques.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(*value), most.max(*value)));
-    if least == most {
-        faults.push(fault(&name, format!("torque is {least} in every row: the column holds no measurement")));
+    if let Some(constant) = extremes.constant(joint) {
+        faults.push(constant);
         return faults;
     }
-    for extreme in [least, most] {
-        let rows = torques.iter().filter(|value| **value == extreme).count();
-        if rows >= SATURATED_ROWS && rows as f64 > SATURATED * torques.len() as f64 {
-            faults.push(fault(
-                &name,
-                format!(
-                    "{rows} of {} torques are exactly {extreme:.4} Nm, the largest: the current is cut off there",
-                    torques.len()
-                ),
-            ));
-        }
-    }
+    faults.extend(extremes.saturated(joint));
     if let Some(velocity) = &recording.velocity {
         faults.extend(velocity_fault(recording, velocity, joint));
     }
@@ -202,15 +196,24 @@ fn velocity_fault(recording: &TorqueRecording, velocity: &[f64], joint: usize) -
 }
 
 /// What is odd about a recording that can be used, a sentence each.
-pub(super) fn remarks(bridged: &Bridged, clock: &RecordingClock) -> Vec<String> {
-    let recording = &bridged.recording;
-    let mut remarks = Vec::new();
+pub(super) fn remarks(recording: &TorqueRecording, origin: &[usize], clock: &RecordingClock) -> Vec<String> {
     let usual = 1.0 / clock.rate;
-    for stretch in &clock.stretches[1..] {
+    let torn = |stretch: &std::ops::Range<usize>| {
         let lasted = recording.time[stretch.start] - recording.time[stretch.start - 1];
-        let what = if lasted > 1.5 * usual { format!("the clock jumps by {lasted:.3} s") } else { "a joint jumps".into() };
-        remarks.push(format!("row {}: {what}; nothing is filtered across it", bridged.origin[stretch.start] + 1));
-    }
+        torn_at(origin[stretch.start], lasted, usual)
+    };
+    clock.stretches[1..].iter().map(torn).chain(of_clock_and_sets(recording, usual)).collect()
+}
+
+/// A sentence on a row before which clock or joints jump: `lasted` s after the row before, where `usual` s are usual.
+pub(super) fn torn_at(row: usize, lasted: f64, usual: f64) -> String {
+    let what = if lasted > 1.5 * usual { format!("the clock jumps by {lasted:.3} s") } else { "a joint jumps".into() };
+    format!("row {}: {what}; nothing is filtered across it", row + 1)
+}
+
+/// Sentences on uneven steps of the clock, which are usually `usual` s, and on rows that judge.
+pub(super) fn of_clock_and_sets(recording: &TorqueRecording, usual: f64) -> Vec<String> {
+    let mut remarks = Vec::new();
     let uneven = recording.time.windows(2).filter(|pair| (pair[1] - pair[0] - usual).abs() > 0.2 * usual).count();
     if uneven > recording.rows() / 20 {
         remarks.push(format!(

@@ -4,11 +4,12 @@ use super::cause::{COULOMB, TorqueForm, VISCOUS};
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
+use crate::effect::Place;
 
 /// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
 const NEARLY_ZERO: f64 = 0.2;
 /// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 50 to 1.
-const CLEAR: f64 = 8.0;
+pub(super) const CLEAR: f64 = 8.0;
 
 /// The forms of one problem, and what each would gain.
 pub(super) struct CauseChoice<'a> {
@@ -120,10 +121,26 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
     remove_below(choice, set, &|_| 0.0);
 }
 
-/// Removes what is hardly worth its penalty: what may as well be nothing is not named. Viscous and Coulomb friction hardly an arm is without.
+/// Removes what is hardly worth its penalty: what may as well be nothing is not named.
 pub(super) fn clear(choice: &CauseChoice, set: &mut Vec<usize>) {
-    let is_common = |number: usize| [VISCOUS, COULOMB].contains(&choice.form(number).cause.name());
-    remove_below(choice, set, &|number| if is_common(number) { 0.0 } else { CLEAR });
+    remove_below(choice, set, &|_| CLEAR);
+}
+
+/// Viscous or Coulomb friction beside the other one where a set has only one of them: hardly a joint is without either, and what is left out
+/// would be in the number of the other with no word of it in its uncertainty.
+pub(super) fn other_friction(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
+    let is_in = |name: &str, place: Place| {
+        set.iter().any(|number| choice.form(*number).cause.name() == name && choice.form(*number).place == place)
+    };
+    let missing = |number: &usize| {
+        let form = choice.form(*number);
+        let other = if form.cause.name() == VISCOUS { COULOMB } else { VISCOUS };
+        !is_in(form.cause.name(), form.place) && is_in(other, form.place)
+    };
+    let missing: Vec<usize> = choice.common().into_iter().filter(missing).collect();
+    let sweep = choice.base.with(set);
+    // Friction that would drive is none.
+    missing.into_iter().filter(|number| sweep.values(*number).iter().all(|value| *value > 0.0)).collect()
 }
 
 /// Removes the least worthy until each is worth what is asked of it.

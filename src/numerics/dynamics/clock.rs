@@ -28,29 +28,58 @@ impl RecordingClock {
 
     /// Of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
-        let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let usual = nearest(&mut steps, 0.5).unwrap_or(1.0);
-        let n = recording.joints;
-        let step =
-            |row: usize, joint: usize| (recording.position[row * n + joint] - recording.position[(row - 1) * n + joint]).abs();
-        let fastest: Vec<f64> = (0..n)
-            .map(|joint| {
-                let mut all: Vec<f64> = (1..recording.rows()).map(|row| step(row, joint)).collect();
-                nearest(&mut all, 0.999).unwrap_or(0.0)
-            })
-            .collect();
-        let torn = |row: usize| {
-            let lasted = recording.time[row] - recording.time[row - 1];
-            lasted > GAP * usual || lasted <= 0.0 || (0..n).any(|joint| step(row, joint) > JUMP * fastest[joint] + 1e-12)
-        };
+        Self::paced(recording, &ClockPace::of(recording))
+    }
+
+    /// Of rows of a recording whose pace is known.
+    pub fn paced(recording: &TorqueRecording, pace: &ClockPace) -> Self {
         let mut stretches = Vec::new();
         let mut start = 0;
         for row in 1..=recording.rows() {
-            if row == recording.rows() || torn(row) {
+            if row == recording.rows() || pace.is_torn(recording, row) {
                 stretches.push(start..row);
                 start = row;
             }
         }
-        Self { rate: 1.0 / usual, stretches }
+        Self { rate: 1.0 / pace.usual, stretches }
     }
+}
+
+/// How fast rows come, and how far joints go from row to row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ClockPace {
+    /// s from row to row, median.
+    pub usual: f64,
+    /// rad from row to row, per joint: 999 of 1000 steps are shorter.
+    pub fastest: Vec<f64>,
+}
+
+impl ClockPace {
+    /// Of a checked recording.
+    pub fn of(recording: &TorqueRecording) -> Self {
+        let fastest = |joint: usize| {
+            let mut all: Vec<f64> = (1..recording.rows()).map(|row| step(recording, row, joint)).collect();
+            nearest(&mut all, 0.999).unwrap_or(0.0)
+        };
+        Self { usual: Self::usual_step(recording), fastest: (0..recording.joints).map(fastest).collect() }
+    }
+
+    /// s from row to row, median.
+    pub fn usual_step(recording: &TorqueRecording) -> f64 {
+        let mut steps: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        nearest(&mut steps, 0.5).unwrap_or(1.0)
+    }
+
+    /// Whether clock or joints jump before a row, which is not the first one.
+    pub fn is_torn(&self, recording: &TorqueRecording, row: usize) -> bool {
+        let lasted = recording.time[row] - recording.time[row - 1];
+        let jumps = |(joint, fastest): (usize, &f64)| step(recording, row, joint) > JUMP * fastest + 1e-12;
+        lasted > GAP * self.usual || lasted <= 0.0 || self.fastest.iter().enumerate().any(jumps)
+    }
+}
+
+/// rad from the row before.
+fn step(recording: &TorqueRecording, row: usize, joint: usize) -> f64 {
+    let n = recording.joints;
+    (recording.position[row * n + joint] - recording.position[(row - 1) * n + joint]).abs()
 }

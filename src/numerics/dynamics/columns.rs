@@ -81,6 +81,24 @@ impl TorqueColumns {
         }
     }
 
+    /// Columns of the listed forms, and of those of a set, that are made of the sign of a velocity, anew.
+    pub fn renew_signs(&mut self, set: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
+        let used = |number: &usize| *number < self.listed || set.contains(number);
+        for number in
+            (0..self.forms.len()).filter(used).filter(|number| self.forms[*number].cause.is_of_sign()).collect::<Vec<_>>()
+        {
+            let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
+            let range = self.of(number);
+            self.columns[range].clone_from_slice(&fresh);
+        }
+    }
+
+    /// Takes a column of no form; its number.
+    pub fn push_bare(&mut self, column: TorqueColumn) -> usize {
+        self.columns.push(column);
+        self.columns.len() - 1
+    }
+
     /// Columns of a form.
     pub fn of(&self, form: usize) -> std::ops::Range<usize> {
         self.first[form]..self.first[form] + self.forms[form].width
@@ -88,20 +106,25 @@ impl TorqueColumns {
 }
 
 /// A form's columns.
-fn columns_of(form: &TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> Vec<TorqueColumn> {
+pub(super) fn columns_of(
+    form: &TorqueForm,
+    scene: &DynamicScene,
+    reduction: &Reduction,
+    regressor: &ReducedRegressor,
+) -> Vec<TorqueColumn> {
     if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
         return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
     }
-    let (mut whole, mut room) = (vec![0.0; scene.rows()], Vec::new());
     let joints = form.cause.acts_on(form, scene.joints());
-    let mut columns = vec![TorqueColumn { joints: joints.clone(), courses: Vec::new() }; form.width];
-    for (number, column) in columns.iter_mut().enumerate() {
-        for joint in &joints {
-            form.cause.write(form, scene, *joint, number, &mut whole);
-            column.courses.push(reduction.reduce(&mut whole, &mut room));
-        }
-    }
-    columns
+    let written = |(number, joint): (usize, usize)| {
+        let mut whole = vec![0.0; scene.rows()];
+        form.cause.write(form, scene, joint, number, &mut whole);
+        whole
+    };
+    let places = (0..form.width).flat_map(|number| joints.iter().map(move |joint| (number, *joint)));
+    let mut courses = reduction.reduce(places.map(written).collect()).into_iter();
+    let column = |_| TorqueColumn { courses: courses.by_ref().take(joints.len()).collect(), joints: joints.clone() };
+    (0..form.width).map(column).collect()
 }
 
 /// Changes of links' numbers with their columns and 1 / variance beforehand.

@@ -8,7 +8,7 @@ const REST: f64 = 2.0;
 
 /// Whether a joint rests in a judged row.
 pub(super) fn rests(problem: &TorqueProblem, joint: usize, row: usize) -> bool {
-    problem.scene.velocity[joint][problem.reduction.rows[row]].abs() < REST * problem.scene.sign_width
+    problem.scene.velocity[joint][problem.reduction.rows[row]].abs() < REST * problem.scene.width_at(joint)
 }
 
 /// Of a residual (`[joint][judged row]`, Nm) in some rows.

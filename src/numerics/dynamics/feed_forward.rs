@@ -6,6 +6,7 @@ use super::clock::RecordingClock;
 use super::model::TorqueModel;
 use super::recording::TorqueRecording;
 use super::scene::{DynamicScene, column};
+use crate::effect::Place;
 use crate::error::{Error, Result};
 
 /// s: longer ago than any gear warms up.
@@ -79,6 +80,9 @@ impl TorqueModel {
             None => vec![vec![0.0; rows]; n],
         };
         scene.believe(&self.inertials);
+        if forms.iter().any(|form| form.place == Place::Base) {
+            scene.tilt(&self.inertials);
+        }
         let courses = self.courses(&forms, &scene);
         let mut torque: Vec<Vec<f64>> = scene.rigid.clone();
         for one in &courses {
@@ -89,7 +93,7 @@ impl TorqueModel {
         let correction: Vec<Vec<f64>> = differences.collect();
         let by_row = |courses: &[Vec<f64>]| (0..rows).flat_map(|row| courses.iter().map(move |course| course[row])).collect();
         Ok(NeededTorques {
-            u95: self.uncertainty(&forms, &scene, &courses),
+            u95: self.uncertainty(&forms, &mut scene, &courses),
             torque: by_row(&torque),
             load: by_row(&scene.rigid),
             correction: by_row(&correction),
@@ -127,7 +131,9 @@ impl TorqueModel {
         let recording = TorqueRecording::of_motion(n, motion.time.clone(), motion.position.clone());
         let clock = RecordingClock::even(&motion.time);
         let mut scene = DynamicScene::new(arm, &recording, &clock, self.cutoff, false);
-        scene.sign_width = self.sign_width;
+        scene.turn_over(self.sign_width);
+        scene.turn_each_over(self.range.iter().map(|range| range.sign_width));
+        scene.friction_lead = self.friction_lead;
         let begun = motion.since_start.unwrap_or(LONG_AGO);
         scene.time.iter_mut().for_each(|time| *time += begun);
         let columns = |all: &Vec<f64>| (0..n).map(|joint| column(all, n, joint)).collect::<Vec<Vec<f64>>>();

@@ -6,17 +6,22 @@ use super::model::{JointRange, TorqueModel};
 use super::modelled::COVERAGE;
 use super::newton_euler::{INERTIAL_NUMBERS, InverseDynamics};
 use super::scene::{DynamicScene, split};
+use super::shape_slopes::planned_slopes;
 
 impl TorqueModel {
     /// Nm, 95 %, row-major (rows x n); `None` where the model carries no covariance. The variance of a torque is that of its numbers, each
-    /// by what it adds, what held-out rows left besides, and the square of what each law adds times how far beyond its range it is used, as a
+    /// by what it adds (of a shape number to first order), what held-out rows left besides, and the square of what each law adds times how far beyond its range it is used, as a
     /// share of that range.
-    pub(super) fn uncertainty(&self, forms: &[TorqueForm], scene: &DynamicScene, courses: &[TermCourse]) -> Option<Vec<f64>> {
+    pub(super) fn uncertainty(&self, forms: &[TorqueForm], scene: &mut DynamicScene, courses: &[TermCourse]) -> Option<Vec<f64>> {
         let known = self.identified.iter().filter(|known| **known).count();
-        let width = known + self.terms.iter().map(|term| term.coefficients.len()).sum::<usize>();
+        let coefficients: Vec<&[f64]> = self.terms.iter().map(|term| term.coefficients.as_slice()).collect();
+        let linear = known + coefficients.iter().map(|own| own.len()).sum::<usize>();
+        let width = linear + forms.iter().map(|form| form.shape_numbers().len()).sum::<usize>() + 1;
         if self.covariance.len() != width * width {
             return None;
         }
+        let shapes = planned_slopes(forms, &coefficients, scene, linear);
+        let scene = &*scene;
         let (n, rows) = (self.joints(), scene.rows());
         let places: Vec<Option<usize>> = self.places();
         let by_joint: Vec<Vec<&TermCourse>> =
@@ -35,6 +40,7 @@ impl TorqueModel {
             });
             for (joint, slope) in slopes.iter_mut().enumerate() {
                 slope.extend(by_joint[joint].iter().map(|one| (known + one.coefficient, one.course[row])));
+                slope.extend(shapes.iter().filter(|one| one.1 == joint).map(|(number, _, course)| (*number, course[row])));
                 let row_of = |(a, first): &(usize, f64)| {
                     let own = &self.covariance[a * width..(a + 1) * width];
                     first * slope.iter().map(|(b, second)| own[*b] * second).sum::<f64>()

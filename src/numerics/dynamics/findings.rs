@@ -1,8 +1,9 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
-use super::cause::FittedNumber;
+use super::cause::{FittedNumber, TorqueForm};
 use super::choice::CauseChoice;
 use super::problem::TorqueProblem;
+use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueEvidence, TorqueFinding, TorqueParameter, TorqueRival};
 use crate::diagnose::Probabilities;
@@ -16,12 +17,18 @@ const TEMPERATURE: f64 = 2.0;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
-/// Findings of a judged set, strongest first.
-pub(super) fn findings(choice: &CauseChoice, set: &[usize], held_out: &[usize]) -> Vec<TorqueFinding> {
+/// Findings of a judged set but for what is silent, strongest first.
+pub(super) fn findings(
+    choice: &CauseChoice,
+    (set, silent): (&[usize], &[usize]),
+    held_out: &[usize],
+    uncertain: (&SweptColumns, &ShapeSlopes),
+) -> Vec<TorqueFinding> {
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
+    let named = set.iter().filter(|number| silent.iter().all(|one| !choice.form(*one).is_called_as(choice.form(**number))));
     let mut found: Vec<TorqueFinding> =
-        set.iter().map(|number| finding(choice, set, &sweep, &solution, *number, held_out)).collect();
+        named.map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain)).collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     found
 }
@@ -29,13 +36,13 @@ pub(super) fn findings(choice: &CauseChoice, set: &[usize], held_out: &[usize]) 
 fn finding(
     choice: &CauseChoice,
     set: &[usize],
-    sweep: &SweptColumns,
-    solution: &[(usize, f64)],
+    (sweep, solution): (&SweptColumns, &[(usize, f64)]),
     number: usize,
     held_out: &[usize],
+    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
-    let fitted = fitted(problem, sweep, solution, number);
+    let fitted = fitted(problem, uncertain, solution, number);
     let rest: Vec<usize> = set.iter().copied().filter(|other| *other != number).collect();
     let without = choice.base.with(&rest);
     let loss = sweep.loss(number, solution);
@@ -55,7 +62,7 @@ fn finding(
         effect: form.cause.name(),
         place: form.place,
         statement: form.cause.statement(form, &fitted),
-        parameters: form.cause.parameters(form, &fitted),
+        parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| slopes.sigma(uncertain, number, index)),
         evidence: TorqueEvidence {
             gain: loss.square,
             f_statistic: loss.square / rank,
@@ -69,6 +76,15 @@ fn finding(
     };
     weigh(&mut finding, loss.square - choice.penalty(number, loss.rank.max(1)));
     finding
+}
+
+/// Parameters with the standard deviations of shape numbers.
+fn with_shapes(mut all: Vec<TorqueParameter>, form: &TorqueForm, sigma: impl Fn(usize) -> Option<f64>) -> Vec<TorqueParameter> {
+    for span in form.shape_numbers() {
+        let own = all.iter_mut().find(|parameter| parameter.name == span.name);
+        own.into_iter().for_each(|parameter| parameter.sigma = sigma(span.index));
+    }
+    all
 }
 
 /// Coefficients of a form with their standard deviations.

@@ -14,6 +14,8 @@ const DEVIATIONS: f64 = 2.0;
 /// A set that held-out rows have confirmed, and what they did not.
 pub(super) struct JudgedSet {
     pub set: Vec<usize>,
+    /// Of the set: part of the model, but too little to be named.
+    pub silent: Vec<usize>,
     /// With what held-out rows gained by each.
     pub withdrawn: Vec<(usize, f64)>,
 }
@@ -47,7 +49,7 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
 pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
     let mut withdrawn = Vec::new();
     if choice.problem.runs(true).is_empty() {
-        return JudgedSet { set, withdrawn };
+        return JudgedSet { set, silent: Vec::new(), withdrawn };
     }
     loop {
         let solution = choice.base.with(&set).solution();
@@ -65,7 +67,7 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
         withdrawn.push((set.remove(worst), gains[worst].0));
     }
-    JudgedSet { set, withdrawn }
+    JudgedSet { set, silent: Vec::new(), withdrawn }
 }
 
 /// Whether one form modifies the friction that another is.

@@ -31,7 +31,10 @@ pub(super) struct Latency {
 /// The latency, where there is one that most joints agree on.
 pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
     let basic: Vec<usize> = (0..problem.all.forms.len())
-        .filter(|form| [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&problem.all.forms[*form].cause.name()))
+        .filter(|form| {
+            problem.all.forms[*form].width == 1
+                && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&problem.all.forms[*form].cause.name())
+        })
         .collect();
     let (noise, _) = noise_beside(problem, &basic);
     let runs = problem.runs(false);

@@ -5,10 +5,12 @@
 //! is declared for it, and its centre is where the torques need it.
 
 use super::arm::{DynamicArm, Inertial};
+use super::cause::COULOMB;
 use super::consistency::nearest;
 use super::inertials::numbers;
-use super::model::TorqueModel;
+use super::model::{TorqueModel, TorqueTerm};
 use super::newton_euler::INERTIAL_NUMBERS;
+use crate::effect::Place;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A link as torques show it.
@@ -23,6 +25,15 @@ pub struct LinkFromTorques {
 }
 
 impl TorqueModel {
+    /// Friction of each joint (n, Nm) that turns with the direction of motion; `None` where none was found.
+    pub fn coulomb(&self) -> Vec<Option<f64>> {
+        let at = |joint: usize| {
+            let here = |term: &&TorqueTerm| term.effect == COULOMB && term.place == Place::Joint(joint);
+            self.terms.iter().find(here)?.coefficients.first().copied().filter(|friction| *friction > 0.0)
+        };
+        (0..self.joints()).map(at).collect()
+    }
+
     /// The links (n) of the arm that the model was identified on, without the payload that it declares. `masses` (n, kg, above 0): what is
     /// declared of each link, or what it shall have where nothing is.
     pub fn links(&self, arm: &DynamicArm, masses: &[f64]) -> Vec<LinkFromTorques> {
@@ -65,7 +76,15 @@ mod tests {
     use super::*;
 
     fn model(inertials: Vec<f64>, identified: Vec<bool>) -> TorqueModel {
-        let seen = JointRange { position: [-1.0, 1.0], speed: 1.0, acceleration: 1.0, load: 1.0, misfit: 0.0, usual: 0.0 };
+        let seen = JointRange {
+            position: [-1.0, 1.0],
+            speed: 1.0,
+            acceleration: 1.0,
+            load: 1.0,
+            misfit: 0.0,
+            usual: 0.0,
+            sign_width: 0.01,
+        };
         TorqueModel {
             range: vec![seen; inertials.len() / 10],
             inertials,
@@ -73,6 +92,7 @@ mod tests {
             terms: Vec::new(),
             covariance: Vec::new(),
             sign_width: 0.01,
+            friction_lead: 0.0,
             latency: 0.0,
             cutoff: 10.0,
             temperature: None,

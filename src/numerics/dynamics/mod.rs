@@ -7,6 +7,8 @@ mod bootstrap;
 mod bridge;
 #[cfg(test)]
 mod cases;
+#[cfg(test)]
+mod cases_shapes;
 mod cause;
 mod changes;
 mod check;
@@ -21,12 +23,14 @@ mod derivatives;
 mod enforce;
 mod errors;
 mod excite;
+mod extremes;
 mod feed_forward;
 mod feed_gate;
 mod feed_uncertainty;
 mod filter;
 mod findings;
 mod friction_curve;
+mod friction_lead;
 mod inertial_names;
 mod inertials;
 mod judge;
@@ -39,21 +43,28 @@ mod nameless;
 mod newton_euler;
 mod noise;
 mod outcome;
+mod polish;
 mod problem;
 mod recording;
 mod reduce;
 mod refine;
 mod regressor;
+mod rejudge;
 mod rich;
 mod scene;
 mod search;
+mod shape_slopes;
 mod sign_width;
 mod solve;
+mod source;
 mod stacked;
+mod survey;
 mod sweep;
 mod term_names;
+mod thin;
 mod types;
 mod unseen;
+mod used;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
@@ -67,14 +78,14 @@ pub use masses::LinkFromTorques;
 pub use model::{JointRange, TorqueModel, TorqueTerm};
 pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, MotionRow};
 pub use recording::TorqueRecording;
+pub use source::TorqueSource;
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
     TorqueEvidence, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
 };
 
 use crate::error::{Error, Result};
-use bridge::Bridged;
-use clock::RecordingClock;
+use used::UsedRecording;
 
 /// What torques that come late are called.
 const LATENCY: &str = "current_latency";
@@ -85,30 +96,37 @@ const LEAST_STRETCH: usize = 200;
 /// At most this share of the rate.
 const HIGHEST_CUTOFF: f64 = 0.3;
 
-/// Diagnoses a recording of torques; `tell` receives the progress, a line each.
+/// Diagnoses a recording of torques; `tell` receives the progress, a line each. Of a recording that is too long to be held at once, rows are
+/// kept after a low-pass, which a remark says; the rows of the result are those of the recording.
 ///
 /// # Errors
 /// [`crate::error::Error::Data`] where the recording cannot be used: sizes, a clock that jumps, constant columns, units, or an arm that
-/// hardly moves.
+/// hardly moves; and what reading it fails with.
 pub fn diagnose(
     arm: &DynamicArm,
-    recording: &TorqueRecording,
+    recording: &dyn TorqueSource,
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
-    check::check(arm, recording)?;
-    let bridged = Bridged::of(recording);
-    let clock = RecordingClock::of(&bridged.recording);
+    diagnose_used(arm, UsedRecording::of(arm, recording, question.cutoff)?, question, tell)
+}
+
+fn diagnose_used(
+    arm: &DynamicArm,
+    used: UsedRecording,
+    question: &TorqueQuestion,
+    tell: &mut dyn FnMut(String),
+) -> Result<TorqueDiagnosis> {
+    let UsedRecording { recording, clock, origin, remarks } = used;
     if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
         return Err(Error::data(
             "time",
             format!("the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"),
         ));
     }
-    let remarks = check::remarks(&bridged, &clock).into_iter().chain(bridged.remark(recording.rows())).collect();
-    let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&bridged.recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
-    let solved = solve::solve(arm, &bridged.recording, question, &clock, cutoff, tell);
+    let cutoff = question.cutoff.unwrap_or_else(|| cutoff::cutoff(&recording, &clock)).min(HIGHEST_CUTOFF * clock.rate);
+    let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
     let mut diagnosis = outcome::outcome(&solved, question, remarks);
-    diagnosis.courses.row.iter_mut().for_each(|row| *row = bridged.origin[*row]);
+    diagnosis.courses.row.iter_mut().for_each(|row| *row = origin[*row]);
     Ok(diagnosis)
 }

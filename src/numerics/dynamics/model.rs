@@ -35,6 +35,8 @@ pub struct JointRange {
     pub misfit: f64,
     /// Nm, 95 %: what is usual for the model's torque there, by the covariance and the misfit.
     pub usual: f64,
+    /// rad/s over which the sign of its velocity turns: the model's, but where friction leads.
+    pub sign_width: f64,
 }
 
 /// The identified model of an arm's torques.
@@ -44,12 +46,16 @@ pub struct TorqueModel {
     pub inertials: Vec<f64>,
     /// 10 n: all where masses were declared, else the base parameters, which stand for others too.
     pub identified: Vec<bool>,
-    /// All findings that add torque at joints.
+    /// All causes that add torque at joints: findings, and of viscous and Coulomb friction the one that is too small to be named beside the
+    /// other.
     pub terms: Vec<TorqueTerm>,
-    /// Of identified inertials, then of all coefficients, row-major; with the noise's autocorrelation. Empty where it is not known.
+    /// Of identified inertials, of all coefficients, of the numbers of shapes that were found, term after term, and of the width of a
+    /// sign, row-major; with the noise's autocorrelation. Empty where it is not known.
     pub covariance: Vec<f64>,
     /// rad/s over which the sign of a velocity turns.
     pub sign_width: f64,
+    /// s by which friction turns before the velocity does.
+    pub friction_lead: f64,
     /// s by which the recording's torques came late; they do not when they are commanded.
     pub latency: f64,
     /// Hz, of the low-pass of the recording.

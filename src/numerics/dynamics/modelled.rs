@@ -4,6 +4,7 @@ use super::choice::CauseChoice;
 use super::model::{JointRange, TorqueModel, TorqueTerm};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::problem::TorqueProblem;
+use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use crate::statistics::nearest;
 
@@ -14,7 +15,12 @@ const ASKED: usize = 300;
 
 impl TorqueModel {
     /// Of a judged set.
-    pub(super) fn of(choice: &CauseChoice, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Self {
+    pub(super) fn of(
+        choice: &CauseChoice,
+        set: &[usize],
+        (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+        solution: &[(usize, f64)],
+    ) -> Self {
         let problem = choice.problem;
         let adds = |number: &usize| {
             let form = choice.form(*number);
@@ -33,16 +39,17 @@ impl TorqueModel {
                 rms: rms(problem, problem.all.of(*number).map(|column| (column, value(column))).collect()),
             }
         };
-        let (identified, covariance) = covariance(problem, set, &adding, sweep);
+        let (identified, covariance) = covariance(problem, set, &adding, (uncertain, slopes));
         let mut inertials = problem.inertials(set, solution);
         inertials.iter_mut().zip(&identified).filter(|(_, known)| !**known).for_each(|(number, _)| *number = 0.0);
-        let certainty = certainty(problem, set, sweep, solution);
+        let certainty = certainty(problem, set, (uncertain, slopes), solution);
         Self {
             inertials,
             identified,
             terms: adding.iter().map(term).collect(),
             covariance,
             sign_width: problem.scene.sign_width,
+            friction_lead: problem.scene.friction_lead,
             latency: problem.latency,
             cutoff: problem.reduction.cutoff,
             range: certainty
@@ -65,9 +72,16 @@ fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
 
 /// Of each joint, Nm: what held-out rows (fitted ones where none are) leave beyond noise and the covariance of the numbers, one standard
 /// deviation, and the median of the torque's uncertainty (95 %).
-fn certainty(problem: &TorqueProblem, set: &[usize], sweep: &SweptColumns, solution: &[(usize, f64)]) -> Vec<[f64; 2]> {
-    let columns: Vec<usize> = (0..problem.all.base).chain(set.iter().flat_map(|number| problem.all.of(*number))).collect();
-    let (all, width) = (sweep.covariance(&columns), columns.len());
+fn certainty(
+    problem: &TorqueProblem,
+    set: &[usize],
+    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+    solution: &[(usize, f64)],
+) -> Vec<[f64; 2]> {
+    let of_forms = set.iter().flat_map(|number| problem.all.of(*number));
+    let of_shapes = slopes.0.iter().map(|(_, column)| *column);
+    let columns: Vec<usize> = (0..problem.all.base).chain(of_forms).chain(of_shapes).collect();
+    let (all, width) = (uncertain.covariance(&columns), columns.len());
     let residual = problem.residual(solution);
     let held: Vec<usize> = problem.runs(true).into_iter().flatten().collect();
     let rows = if held.is_empty() { problem.runs(false).into_iter().flatten().collect() } else { held };
@@ -110,11 +124,17 @@ fn range(problem: &TorqueProblem, joint: usize, misfit: f64, usual: f64) -> Join
         load: most(&problem.scene.rigid[joint]),
         misfit,
         usual,
+        sign_width: problem.scene.width_at(joint),
     }
 }
 
-/// Which inertial numbers are identified, and the covariance of these and of the coefficients of `adding`.
-fn covariance(problem: &TorqueProblem, set: &[usize], adding: &[usize], sweep: &SweptColumns) -> (Vec<bool>, Vec<f64>) {
+/// Which inertial numbers are identified, and the covariance of these, of the coefficients of `adding` and of the numbers of shapes.
+fn covariance(
+    problem: &TorqueProblem,
+    set: &[usize],
+    adding: &[usize],
+    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+) -> (Vec<bool>, Vec<f64>) {
     let mut columns: Vec<usize> = Vec::new();
     // Each number of the model as a sum of coefficients: position in `columns`, and share.
     let mut sums: Vec<Vec<(usize, f64)>> = Vec::new();
@@ -133,11 +153,11 @@ fn covariance(problem: &TorqueProblem, set: &[usize], adding: &[usize], sweep: &
             }
         }
     }
-    for column in adding.iter().flat_map(|number| problem.all.of(*number)) {
+    for column in adding.iter().flat_map(|number| problem.all.of(*number)).chain(slopes.0.iter().map(|(_, column)| *column)) {
         sums.push(vec![(columns.len(), 1.0)]);
         columns.push(column);
     }
-    let (all, width) = (sweep.covariance(&columns), columns.len());
+    let (all, width) = (uncertain.covariance(&columns), columns.len());
     let entry = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
         a.iter().map(|(row, left)| left * b.iter().map(|(column, right)| right * all[row * width + column]).sum::<f64>()).sum()
     };

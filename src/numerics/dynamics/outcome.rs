@@ -8,7 +8,7 @@ use super::findings::{contact, findings, plain_finding};
 use super::friction_curve::friction_curves;
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
-use super::nameless::{unconfirmed, unname};
+use super::nameless::{absorb, absorb_drag, unconfirmed, unname};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -35,6 +35,7 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
+    let uncertain = solved.slopes.beside(&sweep);
     let bodies = if question.enforce_bodies { with_bodies(problem, set, &sweep, &free) } else { None };
     let (solution, enforced) = bodies.map_or_else(|| (free.clone(), None), |(solution, enforced)| (solution, Some(enforced)));
     // As the arm is simulated today: as declared, else with identified masses alone.
@@ -47,7 +48,9 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     if let Some(enforced) = &enforced {
         remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
     }
-    let mut found = findings(&choice, set, &held);
+    let mut found = findings(&choice, (set, &solved.judged.silent), &held, (&uncertain, &solved.slopes));
+    absorb(&choice, set, &free, &mut found);
+    absorb_drag(&choice, set, &uncertain, &mut found);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
     unname(&choice, &last, &mut found);
@@ -83,9 +86,9 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
         leftover,
         events: problem.events.clone(),
         courses: courses(problem, &first, &last),
-        inertials: inertials(problem, set, &sweep, &solution),
-        friction: friction_curves(problem, set, &sweep),
-        model: TorqueModel::of(&choice, set, &sweep, &solution),
+        inertials: inertials(problem, set, &uncertain, &solution),
+        friction: friction_curves(problem, set, &sweep, (&uncertain, &solved.slopes)),
+        model: TorqueModel::of(&choice, set, (&uncertain, &solved.slopes), &solution),
         enforced,
     }
 }
@@ -105,8 +108,14 @@ fn said_of_bodies(enforced: &EnforcedBodies, before: &TorqueErrors, after: &Torq
 
 /// How rows came about.
 fn said_of_filters(problem: &TorqueProblem) -> String {
+    let lead = 1e3 * problem.scene.friction_lead;
+    let turns = match lead {
+        0.0 => String::new(),
+        lead if lead > 0.0 => format!(", {lead:.1} ms before the velocity does"),
+        lead => format!(", {:.1} ms after the velocity does", -lead),
+    };
     format!(
-        "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s",
+        "measured and simulated torques are low-passed alike at {:.1} Hz without delay; {:.1} rows a second are judged; the sign of friction turns over {:.3} rad/s{turns}",
         problem.reduction.cutoff, problem.reduction.rate, problem.scene.sign_width
     )
 }

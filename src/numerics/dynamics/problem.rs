@@ -3,15 +3,16 @@
 use super::arm::DynamicArm;
 use super::cause::TorqueForm;
 use super::clock::RecordingClock;
-use super::columns::TorqueColumns;
+use super::columns::{TorqueColumns, columns_of};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::recording::TorqueRecording;
 use super::reduce::Reduction;
-use super::regressor::ReducedRegressor;
+use super::regressor::{ReducedRegressor, TorqueColumn};
 use super::scene::{DynamicScene, column};
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{Weighing, WeightedColumns};
+use crate::effect::Place;
 use std::ops::Range;
 
 /// s around an event whose rows do not count either.
@@ -45,21 +46,17 @@ impl<'a> TorqueProblem<'a> {
     /// Of a checked recording.
     pub fn new(
         arm: &'a DynamicArm,
-        recording: &TorqueRecording,
+        recording: TorqueRecording,
         question: &TorqueQuestion,
         clock: &RecordingClock,
         cutoff: f64,
     ) -> Self {
-        let scene = DynamicScene::new(arm, recording, clock, cutoff, question.free_inertials);
+        let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
-        let mut room = Vec::new();
-        let filtered = |joint: usize| {
-            let mut course = column(&recording.torque, recording.joints, joint);
-            reduction.filter(&mut course, &mut room);
-            course
-        };
-        let torque = (0..recording.joints).map(filtered).collect();
+        let mut torque: Vec<Vec<f64>> =
+            (0..recording.joints).map(|joint| column(&recording.torque, recording.joints, joint)).collect();
+        reduction.filter(&mut torque);
         let theta = scene.declared.as_ref().map_or_else(|| vec![0.0; 10 * recording.joints], |declared| declared.theta.clone());
         let mut problem = Self {
             held_out: reduction.rows.iter().map(|row| recording.held_out[*row]).collect(),
@@ -90,6 +87,16 @@ impl<'a> TorqueProblem<'a> {
         self.all.push(form, &self.scene, &self.reduction, &self.regressor)
     }
 
+    /// Makes columns of the sign of a velocity anew, after its width has changed.
+    pub fn renew_signs(&mut self, set: &[usize]) {
+        self.all.renew_signs(set, &self.scene, &self.reduction, &self.regressor);
+    }
+
+    /// Columns of a form that is not taken.
+    pub fn columns_of(&self, form: &TorqueForm) -> Vec<TorqueColumn> {
+        columns_of(form, &self.scene, &self.reduction, &self.regressor)
+    }
+
     /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.
     pub fn inertial_changes(&self, set: &[usize], link: usize) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
         let base = self.all.base_changes.iter().enumerate();
@@ -117,9 +124,13 @@ impl<'a> TorqueProblem<'a> {
         theta
     }
 
-    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit.
-    pub fn believe(&mut self, theta: &[f64]) {
+    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit with a set of forms.
+    pub fn believe(&mut self, theta: &[f64], set: &[usize]) {
         self.scene.believe(theta);
+        // A tilt times what is wrong of the masses looks like offsets.
+        if set.iter().any(|number| self.all.forms[*number].place == Place::Base) {
+            self.scene.tilt(theta);
+        }
         self.all.renew(&self.scene, &self.reduction, &self.regressor);
     }
 

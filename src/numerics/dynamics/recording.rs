@@ -1,5 +1,7 @@
 //! A recording of joint torques while the arm moves: arrays in SI on the joint side, rows in the order of time.
 
+use std::ops::Range;
+
 /// Rows of n joints, row-major (rows x n).
 #[derive(Debug, Clone, PartialEq)]
 pub struct TorqueRecording {
@@ -43,5 +45,44 @@ impl TorqueRecording {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time.len()
+    }
+
+    /// No rows of the columns that another has.
+    pub(super) fn like(other: &Self) -> Self {
+        Self {
+            velocity: other.velocity.as_ref().map(|_| Vec::new()),
+            temperature: other.temperature.as_ref().map(|_| Vec::new()),
+            from_current: other.from_current,
+            trajectory: Vec::new(),
+            held_out: Vec::new(),
+            ..Self::of_motion(other.joints, Vec::new(), Vec::new())
+        }
+    }
+
+    /// Appends rows of a recording with the same columns.
+    pub(super) fn extend(&mut self, other: &Self, rows: Range<usize>) {
+        let wide = rows.start * self.joints..rows.end * self.joints;
+        let both = |own: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>, rows: Range<usize>| {
+            own.iter_mut().zip(other).for_each(|(own, other)| own.extend_from_slice(&other[rows.clone()]));
+        };
+        self.time.extend_from_slice(&other.time[rows.clone()]);
+        self.position.extend_from_slice(&other.position[wide.clone()]);
+        both(&mut self.velocity, &other.velocity, wide.clone());
+        self.torque.extend_from_slice(&other.torque[wide]);
+        both(&mut self.temperature, &other.temperature, rows.clone());
+        self.trajectory.extend_from_slice(&other.trajectory[rows.clone()]);
+        self.held_out.extend_from_slice(&other.held_out[rows]);
+    }
+
+    /// Takes the first rows away.
+    pub(super) fn forget(&mut self, rows: usize) {
+        let wide = rows * self.joints;
+        self.time.drain(..rows);
+        self.position.drain(..wide);
+        self.velocity.iter_mut().for_each(|all| drop(all.drain(..wide)));
+        self.torque.drain(..wide);
+        self.temperature.iter_mut().for_each(|all| drop(all.drain(..rows)));
+        self.trajectory.drain(..rows);
+        self.held_out.drain(..rows);
     }
 }

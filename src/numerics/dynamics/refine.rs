@@ -9,6 +9,8 @@ use super::weighted::WeightedColumns;
 const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Points on either side.
 const POINTS: i32 = 3;
+/// The same, beyond the logarithm of the number of rows, for a number that is what it usually is.
+const UNUSUAL: f64 = 4.0;
 /// A gain that is worth a new shape.
 const BETTER: f64 = 0.05;
 
@@ -16,12 +18,23 @@ const BETTER: f64 = 0.05;
 pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize]) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
-        let form = &problem.all.forms[set[place]];
-        for span in form.cause.spans(form) {
-            HALVES.iter().for_each(|half| try_grid(problem, weighted, set, place, span, *half));
-        }
+        refine_one(problem, weighted, set, place);
     }
     before != set
+}
+
+/// Replaces one form of a set.
+pub(super) fn refine_one(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize], place: usize) {
+    let form = &problem.all.forms[set[place]];
+    for span in form.cause.spans(form) {
+        for half in HALVES {
+            try_grid(problem, weighted, set, place, span, half);
+            // What the coarsest grid leaves as it usually is stays so.
+            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                break;
+            }
+        }
+    }
 }
 
 /// One grid about the present number.
@@ -36,7 +49,8 @@ fn try_grid(
     let form = problem.all.forms[set[place]].clone();
     let now = form.shape[span.index];
     let mut trials = vec![set[place]];
-    for point in (-POINTS..=POINTS).filter(|point| *point != 0) {
+    let is_usual = span.usual == Some(now);
+    for point in (-POINTS..=POINTS).filter(|point| if is_usual { point.abs() == POINTS } else { *point != 0 }) {
         let step = half * f64::from(point) / f64::from(POINTS);
         let moved = if span.by_ratio { now * step.exp() } else { now + step };
         if moved < span.least || moved > span.most {
@@ -55,7 +69,8 @@ fn try_grid(
     let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
     let gain = |number: usize| sweep.gain(number).square;
     let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
-    if gain(best) > gain(set[place]) + BETTER {
+    let asked = if is_usual { UNUSUAL + (weighted.rows as f64).ln() } else { BETTER };
+    if gain(best) > gain(set[place]) + asked {
         set[place] = best;
     }
 }

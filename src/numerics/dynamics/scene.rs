@@ -31,10 +31,14 @@ pub(super) struct DynamicScene<'a> {
     pub acceleration: Vec<Vec<f64>>,
     /// Nm, of the inertials as they are believed at present, payload included.
     pub rigid: Vec<Vec<f64>>,
-    /// Nm, of the declared masses under a gravity of 9.81 m/s^2 along x, then along y of the base.
+    /// Nm, under a gravity of 9.81 m/s^2 along x, then along y of the base: of the declared masses, once a tilt is known of those that are
+    /// believed.
     pub sideways: [Vec<Vec<f64>>; 2],
-    /// rad/s over which the sign of a velocity turns.
+    /// rad/s over which the sign of a velocity turns; at each joint, over that.
     pub sign_width: f64,
+    sign_shares: Vec<f64>,
+    /// s by which friction turns before the velocity does.
+    pub friction_lead: f64,
     /// Declared inertials; `None` where none are declared.
     pub declared: Option<DeclaredInertials>,
 }
@@ -45,7 +49,6 @@ impl<'a> DynamicScene<'a> {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);
         let filter = ZeroPhase::new(clock.rate, (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate));
-        let mut room = Vec::new();
         let mut scene = Self {
             arm,
             rate: clock.rate,
@@ -57,12 +60,15 @@ impl<'a> DynamicScene<'a> {
             rigid: vec![vec![0.0; rows]; n],
             sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
             sign_width: SIGN_WIDTHS[1],
+            sign_shares: vec![1.0; n],
+            friction_lead: 0.0,
             declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
         };
-        for joint in 0..n {
-            for stretch in &clock.stretches {
-                let course = &mut scene.position[joint][stretch.clone()];
-                filter.apply(course, &mut room);
+        for stretch in &clock.stretches {
+            let mut courses: Vec<&mut [f64]> = scene.position.iter_mut().map(|course| &mut course[stretch.clone()]).collect();
+            filter.apply(&mut courses);
+            for joint in 0..n {
+                let course = &scene.position[joint][stretch.clone()];
                 let velocity = &mut scene.velocity[joint][stretch.clone()];
                 derivatives(course, clock.rate, velocity, &mut scene.acceleration[joint][stretch.clone()]);
             }
@@ -90,6 +96,37 @@ impl<'a> DynamicScene<'a> {
         (velocity / self.sign_width).tanh()
     }
 
+    /// Takes one width over which the sign of a velocity turns, rad/s, for all joints.
+    pub fn turn_over(&mut self, width: f64) {
+        self.sign_width = width;
+        self.sign_shares.fill(1.0);
+    }
+
+    /// rad/s over which the sign of a joint's velocity turns.
+    pub fn width_at(&self, joint: usize) -> f64 {
+        self.sign_width * self.sign_shares[joint]
+    }
+
+    /// Takes a width of each joint's own, rad/s.
+    pub fn turn_each_over(&mut self, widths: impl IntoIterator<Item = f64>) {
+        self.sign_shares = widths.into_iter().map(|width| width / self.sign_width).collect();
+    }
+
+    /// Takes a width of one joint's own, rad/s.
+    pub fn turn_one_over(&mut self, joint: usize, width: f64) {
+        self.sign_shares[joint] = width / self.sign_width;
+    }
+
+    /// Smoothed sign of a joint's velocity in a row, as friction has it.
+    pub fn direction(&self, joint: usize, row: usize) -> f64 {
+        self.sign_at(joint, self.velocity[joint][row] + self.friction_lead * self.acceleration[joint][row])
+    }
+
+    /// Smoothed sign of a velocity of a joint.
+    pub fn sign_at(&self, joint: usize, velocity: f64) -> f64 {
+        (velocity / self.width_at(joint)).tanh()
+    }
+
     /// s from first to last row.
     pub fn duration(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
@@ -105,8 +142,8 @@ impl<'a> DynamicScene<'a> {
         self.torques(theta, &self.arm.gravity, true)
     }
 
-    /// Torques of a gravity from the side.
-    fn tilt(&mut self, theta: &[f64]) {
+    /// Takes 10 n inertial numbers for the torques of a gravity from the side.
+    pub fn tilt(&mut self, theta: &[f64]) {
         self.sideways = [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
     }
 

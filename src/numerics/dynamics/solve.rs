@@ -1,17 +1,21 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::choice::{CauseChoice, backward, clear};
+use super::choice::{CauseChoice, backward, clear, other_friction};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
+use super::friction_lead::take_friction_lead;
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
+use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
+use super::rejudge::rejudge;
 use super::rich::{noise_beside, rich_forms};
 use super::search::{search, settle};
+use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
@@ -21,33 +25,37 @@ use super::weighted::WeightedColumns;
 const NAMELESS: usize = 4;
 /// s.
 const SAME_TIME: f64 = 0.1;
+/// Rounds in which a latency and the lead of friction find each other, at most.
+const CLOCK_ROUNDS: usize = 4;
 
 /// A recording with what explains it.
 pub(super) struct SolvedTorques<'a> {
     pub problem: TorqueProblem<'a>,
     pub weighted: WeightedColumns,
     pub judged: JudgedSet,
+    /// Of the judged set.
+    pub slopes: ShapeSlopes,
     pub latency: Option<Latency>,
 }
 
 /// Looks for causes.
 pub(super) fn solve<'a>(
     arm: &'a DynamicArm,
-    recording: &TorqueRecording,
+    recording: TorqueRecording,
     question: &TorqueQuestion,
     clock: &RecordingClock,
     cutoff: f64,
     tell: &mut dyn FnMut(String),
 ) -> SolvedTorques<'a> {
     let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
-    problem.scene.sign_width = sign_width(&mut problem);
+    let width = sign_width(&mut problem);
+    problem.scene.turn_over(width);
     problem.form(&question.without);
     let asked = |name: &str| question.without.iter().all(|without| without != name);
-    let found = latency(&problem).filter(|_| asked(super::LATENCY));
     let touched = asked(super::CONTACT);
+    let found = clocked(&mut problem, question, asked(super::LATENCY));
     if let Some(latency) = &found {
         tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
-        problem.shift(latency.seconds);
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
@@ -79,16 +87,39 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &set);
     weighted = problem.weighted();
-    let judged = {
+    polish(&mut problem, &mut weighted, &mut set);
+    if rejudge(&mut problem, &mut weighted, &mut set, question.seed) {
+        learn(&mut problem, &set);
+        weighted = problem.weighted();
+    }
+    let mut judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
         settle(&choice, &mut set);
         let mut judged = judge(&choice, set);
         // What only stood for something that was withdrawn.
         backward(&choice, &mut judged.set);
         clear(&choice, &mut judged.set);
+        judged.silent = other_friction(&choice, &judged.set);
+        judged.set.extend(&judged.silent);
         judged
     };
-    SolvedTorques { problem, weighted, judged, latency: found }
+    polish(&mut problem, &mut weighted, &mut judged.set);
+    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
+    SolvedTorques { problem, weighted, judged, slopes, latency: found }
+}
+
+/// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
+fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: bool) -> Option<Latency> {
+    let mut found = None;
+    for _ in 0..CLOCK_ROUNDS {
+        found = latency(problem).filter(|_| is_asked);
+        problem.shift(found.map_or(0.0, |latency| latency.seconds));
+        if !take_friction_lead(problem) {
+            break;
+        }
+        problem.form(&question.without);
+    }
+    found
 }
 
 /// Searches from what hardly an arm is without.
@@ -116,7 +147,7 @@ fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<u
         let sweep = CauseChoice::new(problem, weighted, seed).base.with(&set);
         problem.inertials(&set, &sweep.solution())
     };
-    problem.believe(&theta);
+    problem.believe(&theta, &set);
     learn(problem, &set);
     *weighted = problem.weighted();
     let mut set = search(&CauseChoice::new(problem, weighted, seed), set);

@@ -62,7 +62,8 @@ impl<'a> SweptColumns<'a> {
         self.all.of(form).for_each(|column| self.take(column));
     }
 
-    fn take(&mut self, column: usize) {
+    /// Takes a column.
+    pub fn take(&mut self, column: usize) {
         let prior = self.all.prior.get(column).copied().unwrap_or(0.0);
         let own = self.weighted.gram[column][column] + prior;
         let mut row = self.weighted.gram[column].clone();

@@ -5,6 +5,9 @@ use super::inertial_names::{inertial_name, inertial_unit};
 use super::model::{TorqueModel, TorqueTerm};
 use crate::error::{Error, Result};
 
+/// Name of the width of a sign among the numbers of a model.
+const SIGN_WIDTH: &str = "recording.sign_width";
+
 impl TorqueTerm {
     /// Its form. Fails where no cause has its name or its numbers are too few.
     pub(super) fn form(&self) -> Result<TorqueForm> {
@@ -14,6 +17,11 @@ impl TorqueTerm {
         let form =
             TorqueForm { cause, place: self.place, with: self.with, shape: self.shape.clone(), width: self.coefficients.len() };
         Ok(form)
+    }
+
+    /// Values of the shape numbers that were found from the data. Fails where no cause has its name.
+    pub fn shape_numbers(&self) -> Result<Vec<f64>> {
+        self.form().map(|form| form.shape_numbers().iter().map(|span| form.shape[span.index]).collect())
     }
 
     /// Quantity and unit of each coefficient. Fails where no cause has its name.
@@ -33,6 +41,11 @@ impl TorqueModel {
             let own = self.prefix(place);
             names.extend(term.names()?.into_iter().map(|(quantity, unit)| (format!("{own}.{quantity}"), unit)));
         }
+        for (place, term) in self.terms.iter().enumerate() {
+            let own = self.prefix(place);
+            names.extend(term.form()?.shape_numbers().iter().map(|span| (format!("{own}.{}", span.name), span.unit)));
+        }
+        names.push((SIGN_WIDTH.into(), "rad/s"));
         Ok(names)
     }
 }

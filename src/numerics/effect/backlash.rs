@@ -2,16 +2,15 @@
 
 use super::basis::around;
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
 };
+use crate::criteria::effect::{BENDS, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
 /// Lost motion by the side of approach or of the load.
 pub struct Backlash;
 
-/// -2 ln of the odds that lost motion grows with time, or that a joint yields otherwise from either side.
-const RARER: f64 = 4.0;
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
 /// Smallest and largest threshold and blur, as shares of the joint's largest load: there the load or the approach decides alone.
@@ -29,15 +28,16 @@ fn mixed(joint: usize, friction_nm: f64, width: f64) -> Law {
     Law::new(Variable::Push { joint, friction_nm }, basis)
 }
 
-impl Backlash {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "backlash";
+/// Friction of a joint (Nm) by the torques of the arm, where they are known and some load is larger: below it, approach alone decides.
+fn known(joint: usize, survey: &Survey) -> Option<f64> {
+    let friction = survey.robot.description().joints[joint].coulomb?;
+    (friction > 0.0 && friction < survey.load(joint)).then_some(friction)
 }
 
 impl Cause for Backlash {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::BACKLASH,
             place: "joint",
             formula: "d = g s, or g sign(t), or the one at small and the other at large loads",
             size: "5 to 100 arcsec",
@@ -53,15 +53,22 @@ impl Cause for Backlash {
             let both = survey.both_directions(joint);
             if survey.is_loaded(joint) {
                 let most = survey.load(joint);
+                let known = known(joint, survey).filter(|_| both);
+                let otherwise = if known.is_some() { *RARE } else { 0.0 };
                 let widths = [1e-9, 0.03, 0.08].map(|share| by_load(joint, share * most));
-                out.extend(widths.map(|law| Hypothesis::new(form(law), 3).positive()));
+                out.extend(widths.map(|law| Hypothesis::new(form(law), 3).positive().penalised(otherwise)));
+                for friction_nm in known.into_iter().flat_map(|friction| [friction, -friction]) {
+                    let laws = BLURS.map(|blur| mixed(joint, friction_nm, blur * friction_nm.abs()));
+                    out.extend(laws.map(|law| Hypothesis::new(form(law), BLURS.len()).positive()));
+                }
                 if both {
                     let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
                     loads.sort_by(f64::total_cmp);
                     let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
                     for friction_nm in shares.into_iter().flat_map(|friction| [friction, -friction]) {
                         let laws = BLURS.map(|blur| mixed(joint, friction_nm, blur * friction_nm.abs()));
-                        out.extend(laws.map(|law| Hypothesis::new(form(law), 10 * BLURS.len()).positive()));
+                        let count = *BENDS * BLURS.len();
+                        out.extend(laws.map(|law| Hypothesis::new(form(law), count).positive().penalised(otherwise)));
                     }
                 }
             }
@@ -71,11 +78,11 @@ impl Cause for Backlash {
                 let [start, end] = survey.time;
                 if end > start {
                     let growing = side.times(Variable::Time, Basis::Creep { start, end, exponent: 1.0 });
-                    out.push(Hypothesis::new(form(growing), 2).penalised(RARER));
+                    out.push(Hypothesis::new(form(growing), 2).penalised(*RARE));
                 }
                 if survey.is_loaded(joint) {
                     let yielding = side.times(Variable::Load { joint }, Basis::PROPORTIONAL);
-                    out.push(Hypothesis::new(form(yielding), 2).penalised(RARER));
+                    out.push(Hypothesis::new(form(yielding), 2).penalised(*RARE));
                 }
             }
         }
@@ -102,6 +109,9 @@ impl Cause for Backlash {
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
         let Variable::Push { joint, friction_nm } = term.law().first.of else { return Vec::new() };
         let width = if let Basis::Rise { width, .. } = term.basis() { width } else { 0.0 };
+        if known(joint, survey) == Some(friction_nm.abs()) {
+            return Vec::new();
+        }
         let bounds = THRESHOLDS.map(|share| share * survey.load(joint));
         let scaled = |value: f64| {
             let sizes = [1.6, 1.25].into_iter().flat_map(move |first| around(value.abs(), first, 0.5, level, bounds));
@@ -114,7 +124,7 @@ impl Cause for Backlash {
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
         let times = |term: &Term| term.law().times.map(|factor| factor.of);
-        match summary.terms(Self::NAME).next().and_then(times) {
+        match summary.terms(names::BACKLASH).next().and_then(times) {
             Some(Variable::Load { .. }) => {
                 return format!(
                     "the compliance of {place} depends on the direction of approach: half the difference is {}",
@@ -124,7 +134,7 @@ impl Cause for Backlash {
             Some(_) => return format!("the lost motion of {place} grows, to a half-gap of {} in the end", summary.size()),
             None => {}
         }
-        let by = match summary.terms(Self::NAME).next().map(|term| term.law().first.of) {
+        let by = match summary.terms(names::BACKLASH).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {
                 let friction = figure(friction_nm.abs(), 0);
@@ -149,8 +159,8 @@ impl Cause for Backlash {
         (pushed && *p.first()? < -error(0)).then(|| "its gap is negative".into())
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["joint_hardening", "joint_compliance", "presliding", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

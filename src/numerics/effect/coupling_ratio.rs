@@ -4,20 +4,18 @@
 
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Hypothesis, Law, Motion, NumberSpec, ParameterSpec,
-    Place, Summary, Survey, Term, Variable, figure,
+    Place, Summary, Survey, Term, Variable, figure, names,
 };
+use crate::criteria::effect::RARER;
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
 
 pub struct CouplingRatio;
 
-/// Joints further apart than neighbours hardly drive each other: -2 ln of the odds.
-const DISTANT: f64 = 6.0;
-
 impl Cause for CouplingRatio {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "coupling_ratio",
+            name: names::COUPLING_RATIO,
             place: "joint A->B",
             formula: "d of B = c q of A",
             size: "1e-5 to 1e-2",
@@ -37,7 +35,7 @@ impl Cause for CouplingRatio {
         let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
         let pairs = pairs.filter(|(by, moved)| by != moved && !declared(*by, *moved));
         let pair = |(by, moved): (usize, usize)| {
-            let penalty = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
+            let penalty = if by.abs_diff(moved) == 1 { 0.0 } else { *RARER };
             let term = Term::new(&Self, Motion::Coupled { by, moved }, Law::of(Variable::Angle { joint: by }));
             Hypothesis::new(term, 1).penalised(penalty)
         };

@@ -2,11 +2,10 @@
 
 use super::interactions::slow;
 use super::{Axes, Basis, Law, Motion, Survey, Variable};
+use crate::criteria::effect::RARE;
 
 /// Cosines of a slow course.
 const SLOW: usize = 3;
-/// -2 ln of the odds beyond those of things outside the library: most frames stand still.
-const RARER: f64 = 4.0;
 
 /// The motions, laws, of how many of its kind each is one, and penalties.
 pub(super) fn laws(survey: &Survey) -> Vec<(Motion, Law, usize, f64)> {
@@ -15,17 +14,17 @@ pub(super) fn laws(survey: &Survey) -> Vec<(Motion, Law, usize, f64)> {
     for (of, [low, high]) in slow(survey) {
         let straight = Law::new(of, Basis::Linear { zero: low, per: high - low });
         let course = Law::new(of, Basis::Cosines { low, high, count: SLOW });
-        out.extend([straight, course].map(|law| (tool, law, 4, RARER)));
+        out.extend([straight, course].map(|law| (tool, law, 4, *RARE)));
         if of == Variable::Temperature {
-            out.push((base, straight, 1, RARER));
+            out.push((base, straight, 1, *RARE));
         }
     }
     let joints = survey.joints();
     let revolute = || survey.revolute();
     for joint in revolute().filter(|joint| survey.both_directions(*joint)) {
         let side = Law::of(Variable::Approach { joint });
-        out.push((tool, side, joints, RARER));
-        out.extend([Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, side, 2 * joints, RARER)));
+        out.push((tool, side, joints, *RARE));
+        out.extend([Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, side, 2 * joints, *RARE)));
     }
     for joint in revolute().filter(|joint| joint + 1 < joints) {
         for turning in [true, false] {
@@ -34,7 +33,7 @@ pub(super) fn laws(survey: &Survey) -> Vec<(Motion, Law, usize, f64)> {
                 .is_loaded(joint)
                 .then(|| Law::new(Variable::Load { joint }, Basis::Linear { zero: 0.0, per: survey.load(joint) }));
             let side = survey.both_directions(joint).then(|| Law::of(Variable::Approach { joint }));
-            out.extend(loaded.into_iter().chain(side).map(|law| (motion, law, 4, RARER)));
+            out.extend(loaded.into_iter().chain(side).map(|law| (motion, law, 4, *RARE)));
         }
     }
     out

@@ -1,6 +1,9 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
+};
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -8,8 +11,6 @@ pub struct GearLoad;
 
 /// Orders per joint turn that are tried.
 const ORDERS: u32 = 24;
-/// -2 ln of the odds that a gear errs with its load alone.
-const RARER: f64 = 4.0;
 
 impl GearLoad {
     fn term(joint: usize, order: u32) -> Term {
@@ -34,7 +35,7 @@ impl Cause for GearLoad {
         let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
         let terms = joints.flat_map(|joint| {
             let orders = orders::within_travel(survey, joint, ORDERS);
-            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(RARER))
+            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(*RARE))
         });
         terms.collect()
     }
@@ -52,8 +53,8 @@ impl Cause for GearLoad {
         format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "joint_compliance", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

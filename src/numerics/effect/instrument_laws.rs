@@ -2,12 +2,10 @@
 
 use super::interactions::slowly;
 use super::{Basis, Law, Polar, Survey, Variable};
+use crate::criteria::effect::{RARE, UNCOMMON};
 
 /// Cosines of a function of the elevation or range.
 const SEEN: usize = 5;
-/// -2 ln of the odds beyond those of things outside the library: of an instrument at all, and of a stand that swings.
-const RARER: f64 = 4.0;
-const SWINGS: f64 = 2.0;
 
 /// The laws of each reading, of how many of its kind each is one, and its penalty; `sways` are periods as shares of the recording.
 pub(super) fn laws(survey: &Survey, sways: &[f64]) -> Vec<(Polar, Law, usize, f64)> {
@@ -18,10 +16,10 @@ pub(super) fn laws(survey: &Survey, sways: &[f64]) -> Vec<(Polar, Law, usize, f6
     let mut out = Vec::new();
     for share in sways.iter().filter(|_| end > start) {
         let swing = Law::new(Variable::Time, Basis::Sway { period: share * (end - start) });
-        out.extend([Polar::Azimuth, Polar::Elevation].map(|of| (of, swing, 2 * sways.len(), SWINGS)));
+        out.extend([Polar::Azimuth, Polar::Elevation].map(|of| (of, swing, 2 * sways.len(), *UNCOMMON)));
     }
     let scaled = |(of, slow)| Law::new(of, slow).times(Variable::Range, Basis::PROPORTIONAL);
-    out.extend(slowly(survey).into_iter().map(|slow| (Polar::Range, scaled(slow), 2, RARER)));
+    out.extend(slowly(survey).into_iter().map(|slow| (Polar::Range, scaled(slow), 2, *RARE)));
     let curve = |of, [low, high]: [f64; 2]| (Law::new(of, Basis::Cosines { low, high, count: SEEN }), 1);
     let [elevations, ranges] = survey.seen();
     let periodic = |order, tried| (Law::new(Variable::Azimuth, Basis::Wave { order, overtone: false }), tried);
@@ -38,6 +36,6 @@ pub(super) fn laws(survey: &Survey, sways: &[f64]) -> Vec<(Polar, Law, usize, f6
         (Polar::Azimuth, periodic(3, 2)),
         (Polar::Azimuth, periodic(4, 2)),
     ];
-    out.extend(seen.map(|(of, (law, tried))| (of, law, tried, RARER)));
+    out.extend(seen.map(|(of, (law, tried))| (of, law, tried, *RARE)));
     out
 }

@@ -2,8 +2,9 @@
 
 use super::motion::{SHORT, extent};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
 };
+use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -12,11 +13,6 @@ use serde::{Deserialize, Serialize};
 
 /// Links that bend under the moment at their far joint.
 pub struct LinkCompliance;
-
-impl LinkCompliance {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "link_compliance";
-}
 
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,16 +33,13 @@ pub struct BentLink {
     bending: Bending,
 }
 
-/// The last links are a stubby wrist, and hardly bend: -2 ln of the odds.
+/// The last links are a stubby wrist, and hardly bend.
 const WRIST: usize = 2;
-const UNLIKELY: f64 = 10.0;
-/// Most of an arm's elasticity is in its gears: -2 ln of the odds that it is a link.
-const RARER: f64 = 4.0;
 
 impl Cause for LinkCompliance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_compliance",
+            name: names::LINK_COMPLIANCE,
             place: "link",
             formula: "the link bends about its far joint, by the moment there",
             size: "0.05 to 1 urad/Nm",
@@ -62,11 +55,15 @@ impl Cause for LinkCompliance {
         let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
         let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
         let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
-        let odds = |form: &BentLink| if form.link + WRIST >= n { UNLIKELY } else { RARER };
+        let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };
         forms
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
             .collect()
+    }
+
+    fn stands_in_for_two(&self) -> bool {
+        true
     }
 
     fn sentence(&self, summary: &Summary) -> String {

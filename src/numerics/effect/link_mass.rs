@@ -3,8 +3,9 @@
 use super::spring::{MEASURE, Spring};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable,
+    Variable, names,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -23,7 +24,7 @@ pub struct WrongLinkMass {
 impl Cause for LinkMass {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_mass",
+            name: names::LINK_MASS,
             place: "link",
             formula: "mass and first moments of a link in the torque model",
             size: "3 to 20 %",
@@ -39,7 +40,7 @@ impl Cause for LinkMass {
         let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
         let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-        forms.map(|form| Hypothesis::new(form, 2).penalised(4.0)).collect()
+        forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -98,7 +99,7 @@ impl Placed for WrongLinkMass {
     }
 
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
-        if Spring::balances(self.link) { vec![("counterbalance", Place::Joint(self.link))] } else { Vec::new() }
+        if Spring::balances(self.link) { vec![(names::COUNTERBALANCE, Place::Joint(self.link))] } else { Vec::new() }
     }
 
     fn is_of_torque_model(&self) -> bool {

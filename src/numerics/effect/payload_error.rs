@@ -3,8 +3,9 @@
 use super::spring::MEASURE;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, figure,
+    Variable, figure, names,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -27,7 +28,7 @@ const TOOL: f64 = 5.0;
 impl Cause for PayloadError {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "payload_error",
+            name: names::PAYLOAD_ERROR,
             place: "tool",
             formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
             size: "3 to 30 %",
@@ -43,7 +44,7 @@ impl Cause for PayloadError {
         // Without any mass of the links nothing says how much of a wind-up is the tool's.
         let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
         if yields && weighs {
-            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(4.0));
+            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(*RARE));
         }
         out
     }

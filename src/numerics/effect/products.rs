@@ -3,8 +3,6 @@
 
 use super::{Basis, Factor, Form, Hypothesis, Motion, Placed, Survey, Term, Unknown, Variable, interactions};
 
-/// -2 ln of the odds that the size of a named cause is no constant.
-const VARYING: f64 = 0.0;
 /// Moves (a quantile of theirs) within which an error may depend on how far the joint came.
 const START: f64 = 0.3;
 
@@ -22,7 +20,7 @@ pub fn products(form: &Form, survey: &Survey) -> Vec<Hypothesis> {
     let count = factors.len();
     let law = |factor: Factor| term.law().times(factor.of, factor.basis);
     let terms = factors.into_iter().map(|factor| Term::new(&Unknown, term.motion(), law(factor)));
-    terms.map(|term| Hypothesis::new(term, count).penalised(VARYING).inheriting()).collect()
+    terms.map(|term| Hypothesis::new(term, count).inheriting()).collect()
 }
 
 /// Whether a form is a product without a name that was made of the law of another one; what its size follows.

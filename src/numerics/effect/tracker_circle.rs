@@ -1,6 +1,7 @@
 //! `tracker_circle`: the horizontal circle of the instrument sits off its axis, or is out of round: azimuths err once or twice a turn.
 
 use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,8 +12,6 @@ const ORDERS: u32 = 2;
 
 /// What shows errors of the instrument itself.
 pub(super) const MEASURE: Measure = Measure { rank: 2, advice: "measure fixed points in both faces, and from a second station" };
-/// An instrument in order errs less than an arm: -2 ln of the odds that it is the one.
-pub(super) const RARER: f64 = 4.0;
 
 impl Cause for TrackerCircle {
     fn about(&self) -> &'static CauseDescription {
@@ -30,7 +29,7 @@ impl Cause for TrackerCircle {
         let orders = (1..=ORDERS).filter(|_| survey.seen_from_outside());
         let motion = Motion::Instrument { of: Polar::Azimuth };
         let term = |order| Term::new(&Self, motion, orders::wave(Variable::Azimuth, order));
-        orders.map(|order| Hypothesis::new(term(order), ORDERS as usize).penalised(RARER)).collect()
+        orders.map(|order| Hypothesis::new(term(order), ORDERS as usize).penalised(*RARE)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

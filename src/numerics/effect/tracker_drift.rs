@@ -5,6 +5,7 @@ use super::{
     Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable,
     warmth,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 
 pub struct TrackerDrift;
@@ -37,11 +38,11 @@ impl Cause for TrackerDrift {
             let steady = Law::new(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
             out.push(Hypothesis::new(form(axes, steady), 3));
             for (law, tried) in warmth::all(survey) {
-                out.push(Hypothesis::new(form(axes, law), 3 * tried).penalised(4.0));
+                out.push(Hypothesis::new(form(axes, law), 3 * tried).penalised(*RARE));
             }
         }
         let slow = Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: SLOW });
-        out.push(Hypothesis::new(form(Axes::Place, slow), 1).penalised(4.0));
+        out.push(Hypothesis::new(form(Axes::Place, slow), 1).penalised(*RARE));
         out
     }
 

@@ -2,8 +2,9 @@
 //! is not level, or the beam leaves it askew.
 
 use super::summary::amplitude;
-use super::tracker_circle::{MEASURE, RARER};
+use super::tracker_circle::MEASURE;
 use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -28,7 +29,7 @@ impl Cause for TrackerElevation {
         let ways = WAYS.into_iter().filter(|_| survey.seen_from_outside());
         let wave = |order| orders::wave(Variable::Elevation, order);
         let terms = ways.map(|(of, order)| Term::new(&Self, Motion::Instrument { of }, wave(order)));
-        terms.map(|term| Hypothesis::new(term, WAYS.len()).penalised(RARER)).collect()
+        terms.map(|term| Hypothesis::new(term, WAYS.len()).penalised(*RARE)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

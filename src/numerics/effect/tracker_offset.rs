@@ -1,9 +1,9 @@
 //! `tracker_offset`: every range is wrong by the same length: a dead path, or the constant of another reflector.
 
-use super::tracker_circle::RARER;
 use super::{
     Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -26,7 +26,7 @@ impl Cause for TrackerOffset {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let term = Term::new(&Self, Motion::Instrument { of: Polar::Range }, Law::new(Variable::Range, ANY));
-        survey.seen_from_outside().then(|| Hypothesis::new(term, 1).penalised(RARER)).into_iter().collect()
+        survey.seen_from_outside().then(|| Hypothesis::new(term, 1).penalised(*RARE)).into_iter().collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

@@ -1,10 +1,10 @@
 //! `tracker_refraction`: ranges scale with the air's temperature, which the instrument does not follow.
 
-use super::tracker_circle::RARER;
 use super::{
     Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
     warmth,
 };
+use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -35,7 +35,7 @@ impl Cause for TrackerRefraction {
             let most = MOST[usize::from(matches!(law.first.basis, Basis::Settling { .. }))];
             let law = law.times(Variable::Range, Basis::PROPORTIONAL);
             let term = Term::new(&Self, Motion::Instrument { of: Polar::Range }, law);
-            Hypothesis::new(term, tried).within(most).penalised(RARER)
+            Hypothesis::new(term, tried).within(most).penalised(*RARE)
         });
         terms.collect()
     }

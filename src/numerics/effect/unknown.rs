@@ -9,10 +9,12 @@ use super::motion::{SHORT, extent};
 use super::orders;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term, Variable,
-    warmth,
+    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NamedForms, NumberSpec, Place, Polar, Summary, Survey,
+    Term, Variable, names, warmth,
 };
 use super::{frames, interactions};
+use crate::criteria::effect::{HARDLY_EVER, LOW_ORDERS, OPEN, RARE, RARER, UNCOMMON};
+use crate::criteria::words::SLOW;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use words::in_words;
@@ -37,30 +39,18 @@ const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
 const PERIODS: [f64; 2] = [0.05, 1.0];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
-/// What depends on another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
-const WOBBLE: f64 = 12.0;
-/// Of an arm of unknown masses a joint that follows its own angle and its neighbour's is nearly always one that its links weigh upon: -2 ln
-/// of the odds that a hose pulls.
-const WEIGHT: f64 = 12.0;
-/// -2 ln of the odds of things outside the library.
-const OPEN: f64 = 8.0;
-/// The same beyond that of products: they are many.
-const PRODUCT: f64 = 2.0;
 /// One sigma of what is known of a coefficient before any measurement, SI.
 const WIDE: f64 = 0.01;
 const PER_LOAD: f64 = 1e-4;
 
 impl Unknown {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "unknown";
-
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         let unweighed = is_unweighed(survey.robot);
         let mut add = |law: Law, tried: usize, penalty: f64| {
             let term = Term::new(&Self, Motion::Joint { joint }, law);
-            let weight = if unweighed && is_hose(&term) { WEIGHT } else { 0.0 };
-            out.push(Hypothesis::new(term, tried).penalised(OPEN + weight + penalty));
+            let weight = if unweighed && is_hose(&term) { *HARDLY_EVER } else { 0.0 };
+            out.push(Hypothesis::new(term, tried).penalised(*OPEN + weight + penalty));
         };
         let own = |basis| Law::new(Variable::Angle { joint }, basis);
         let [low, high] = survey.range[joint];
@@ -82,7 +72,7 @@ impl Unknown {
                 add(own(Basis::Hinge { from: low + share * (high - low), upwards }), places, 0.0);
             }
         }
-        interactions::at_joint(survey, joint).into_iter().for_each(|(law, tried)| add(law, tried, PRODUCT));
+        interactions::at_joint(survey, joint).into_iter().for_each(|(law, tried)| add(law, tried, *UNCOMMON));
         for by in 0..survey.joints() {
             let cosines = |joint: usize, count| {
                 let [low, high] = survey.range[joint];
@@ -93,7 +83,8 @@ impl Unknown {
             // What slides has no turns.
             let turns = |joint: usize| survey.robot.is_revolute(joint);
             if by != joint && turns(by) {
-                (1..=ORDERS).for_each(|order| add(Law::new(angle, Basis::Wave { order, overtone: false }), 6, WOBBLE));
+                (1..=ORDERS)
+                    .for_each(|order| add(Law::new(angle, Basis::Wave { order, overtone: false }), *LOW_ORDERS, *HARDLY_EVER));
             }
             for other in by + 1..survey.joints() {
                 let (second, wave) = (Variable::Angle { joint: other }, Basis::Wave { order: 1, overtone: false });
@@ -106,7 +97,7 @@ impl Unknown {
         let [start, end] = survey.time;
         if end > start {
             add(Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: CURVE }), 1, 0.0);
-            add(Law::new(Variable::Time, Basis::Creep { start, end, exponent: 1.0 }), 1, 4.0);
+            add(Law::new(Variable::Time, Basis::Creep { start, end, exponent: 1.0 }), 1, *RARE);
         }
         out
     }
@@ -115,7 +106,7 @@ impl Unknown {
 impl Cause for Unknown {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::UNKNOWN,
             place: "joint, link, base, tool or tracker",
             formula: "a form-free function of joints, time, payload or sight",
             size: "any",
@@ -127,7 +118,7 @@ impl Cause for Unknown {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
         let mut add = |motion, law, tried, penalty: f64| {
-            out.push(Hypothesis::new(Term::new(&Self, motion, law), tried).penalised(OPEN + penalty));
+            out.push(Hypothesis::new(Term::new(&Self, motion, law), tried).penalised(*OPEN + penalty));
         };
         let [start, end] = survey.time;
         if end > start {
@@ -155,7 +146,7 @@ impl Cause for Unknown {
                 let bent = law.times(Variable::Angle { joint: link + 1 }, Basis::Wave { order: 1, overtone: false });
                 let long = extent(survey.robot, link).norm() > SHORT;
                 if long && survey.robot.is_revolute(link + 1) {
-                    add(Motion::Links { first: link, last: link }, bent, tried, 6.0)
+                    add(Motion::Links { first: link, last: link }, bent, tried, *RARER)
                 }
             }
         }
@@ -167,8 +158,8 @@ impl Cause for Unknown {
         }
         if survey.payload_changes() {
             let loaded = Law::new(Variable::Payload, Basis::After { at: survey.heavy_payload() });
-            add(tool, loaded, 1, 6.0);
-            add(Motion::Base { axes: Axes::Both }, loaded, 1, 6.0);
+            add(tool, loaded, 1, *RARER);
+            add(Motion::Base { axes: Axes::Both }, loaded, 1, *RARER);
         }
         out
     }
@@ -300,7 +291,7 @@ impl Cause for Unknown {
 
     /// A joint that follows a function of its own angle and a neighbour's: a hose runs along both and pulls.
     fn called(&self, term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
-        if is_hose(term) { "cable_drag" } else { Self::NAME }
+        if is_hose(term) { names::CABLE_DRAG } else { names::UNKNOWN }
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -312,8 +303,22 @@ impl Cause for Unknown {
         true
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "joint_table"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::GEAR_CYCLIC, names::JOINT_TABLE]
+    }
+
+    /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        let angles = own.forms.iter().find_map(|form| form.term()?.two_angles());
+        let (Some(angles), Place::Joint(joint)) = (angles, own.place) else { return false };
+        let is_part = |form: &&Form| match (form.place(), form.term().map(Term::basis)) {
+            (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
+            (at, Some(Basis::Wave { order, .. })) if form.name() == names::GEAR_CYCLIC => {
+                at == Place::Joint(joint) && angles.contains(&joint) && order <= *SLOW
+            }
+            _ => false,
+        };
+        part.forms.iter().all(is_part)
     }
 
     fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
@@ -321,11 +326,11 @@ impl Cause for Unknown {
         let joint = matches!(place, Place::Joint(_));
         match (term.basis(), term.law().first.of) {
             (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
-                vec![("axis_wobble", Place::Joint(by))]
+                vec![(names::AXIS_WOBBLE, Place::Joint(by))]
             }
             // No motor current tells of a pull.
-            _ if called == "cable_drag" => vec![(Self::NAME, place)],
-            _ if joint && term.two_angles().is_some() => vec![("cable_drag", place)],
+            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
+            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
             _ => Vec::new(),
         }
     }
@@ -349,7 +354,7 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
 
 /// What a finding's law without a name is a function of and how, in words; none where it has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
-    let (term, numbers) = summary.estimates(Unknown::NAME).next()?;
+    let (term, numbers) = summary.estimates(names::UNKNOWN).next()?;
     // A joint that slides errs by a length.
     let slides = matches!(term.motion(), Motion::Joint { .. }) && numbers.first().is_some_and(|number| number.unit == "mm");
     Some(in_words(term, slides, summary.clock))

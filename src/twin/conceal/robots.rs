@@ -96,6 +96,7 @@ impl Kind {
                 motor_constant: Some(*constant),
                 mass: Some(*mass),
                 centre: Some(metres(*centre)),
+                coulomb: None,
             });
         let point: [f64; 3] = std::array::from_fn(|i| tool[i] + aside[i]);
         let coupled = matches!(self, Kind::Sr210d).then_some(Coupling { moved: 5, by: 4, ratio: 0.0 });

@@ -85,6 +85,7 @@ fn parameter(
         step: if effect == "joint_compliance" { "stiffness" } else { "geometry" }.into(),
         remark: remark.map(str::to_owned),
         form: None,
+        corrects: None,
     }
 }
 
@@ -264,6 +265,7 @@ fn robot(name: &str) -> Robot {
         tolerance_mass: None,
         tolerance_centre_mm: None,
         tolerance_inertia: None,
+        coulomb_nm: None,
     };
     let axes =
         [([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 670.0]), ([0.0, -1.0, 0.0], [312.0, 0.0, 1745.0])];

@@ -76,7 +76,7 @@ fn ratios(inertials: &str, share: f64) -> ([f64; 2], [f64; 2]) {
     (of(found("before")), of(found("after")))
 }
 
-fn table<T: Table>(store: &Path, name: &str) -> T {
+pub(super) fn table<T: Table>(store: &Path, name: &str) -> T {
     let store = Store::open(store).expect("the store");
     let run = find_run(&store, "HEAD").expect("a run");
     let tables = QueryTables::of(&Manifest::of(&store, &run).expect("its record"));

@@ -1,5 +1,6 @@
 //! Formulas that none beats in both price and error (Pareto), and the one that is proposed.
 
+use crate::criteria::closed_form::{BETTER, LIKE, SHOWN};
 /// What a formula costs and how well it carries over to poses that it has not seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Priced {
@@ -7,13 +8,6 @@ pub(super) struct Priced {
     /// Rms of folds, m.
     pub error: f64,
 }
-
-/// Most formulas that are shown.
-pub(super) const SHOWN: usize = 3;
-/// A dearer formula must be better by this share; one within it of the best is as good.
-const BETTER: f64 = 0.005;
-/// A formula whose error is this many times that of the curve says something else than the curve.
-const LIKE: f64 = 1.1;
 
 /// Positions of the formulas worth showing, cheapest first, of those that are better than none at all; and which of them is proposed:
 /// the cheapest that is as good as the best, where that does what the free curve does.
@@ -23,20 +17,20 @@ pub(super) fn front(all: &[Priced], [without, curve]: [f64; 2]) -> Option<(Vec<u
     let mut falls: Vec<(usize, f64)> = Vec::new();
     let mut best = without;
     for k in order {
-        if all[k].error < best * (1.0 - BETTER) {
+        if all[k].error < best * (1.0 - *BETTER) {
             falls.push((k, best / all[k].error));
             best = all[k].error;
         }
     }
     let last = falls.last()?.0;
-    while falls.len() > SHOWN {
+    while falls.len() > *SHOWN {
         // What gains least over the next cheaper one goes; the best stays.
         let (least, _) = falls[..falls.len() - 1].iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
         falls.remove(least);
     }
     let shown: Vec<usize> = falls.into_iter().map(|(k, _)| k).collect();
-    let as_good = |k: &usize| all[*k].error <= all[last].error * (1.0 + BETTER);
-    let chosen = shown.iter().position(as_good).filter(|_| all[last].error <= LIKE * curve);
+    let as_good = |k: &usize| all[*k].error <= all[last].error * (1.0 + *BETTER);
+    let chosen = shown.iter().position(as_good).filter(|_| all[last].error <= *LIKE * curve);
     Some((shown, chosen))
 }
 

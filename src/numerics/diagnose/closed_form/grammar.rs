@@ -2,6 +2,7 @@
 //!
 //! Ranges are those of the kind of variable, not of the recording: a formula of one recording is one of another.
 
+use crate::criteria::closed_form::{ORDER, SPACING, TURNS};
 use crate::effect::{EffectDeclaration, Laws, ShapeRange, Starts, Variable};
 use std::collections::BTreeMap;
 
@@ -29,11 +30,6 @@ impl NamedVariable {
 
 /// rad; no joint of an arm goes further.
 const TURN: f64 = 6.4;
-/// rad, between places at which a search begins.
-const SPACING: f64 = 0.2;
-/// Highest wave number of an angle, and of another variable in turns over its range.
-const ORDER: f64 = 50.0;
-const TURNS: f64 = 8.0;
 
 /// To one digit, outwards.
 fn rounded(value: f64, direction: fn(f64) -> f64) -> f64 {
@@ -88,7 +84,7 @@ fn span(variable: &NamedVariable) -> f64 {
 /// Where something happens.
 fn centre(variable: &NamedVariable) -> (&'static str, ShapeRange) {
     let [from, to] = variable.range;
-    let steps = if variable.is_angle { (span(variable) / SPACING) as usize } else { 12 };
+    let steps = if variable.is_angle { (span(variable) / *SPACING) as usize } else { 12 };
     let start = (1..steps).map(|k| (1e3 * (from + span(variable) * k as f64 / steps as f64)).round() / 1e3).collect();
     ("centre", ShapeRange { from, to, start: Starts(start) })
 }
@@ -103,7 +99,7 @@ fn width(variable: &NamedVariable) -> (&'static str, ShapeRange) {
 /// How often.
 fn order(variable: &NamedVariable) -> (&'static str, ShapeRange) {
     let unit = if variable.is_angle { 1.0 } else { std::f64::consts::TAU / span(variable) };
-    let last = if variable.is_angle { ORDER } else { TURNS };
+    let last = if variable.is_angle { *ORDER } else { *TURNS };
     let start = (1..=4 * last as usize).map(|k| 0.25 * k as f64).filter(|k| *k >= 0.5 && *k < last).map(|k| k * unit);
     ("order", ShapeRange { from: 0.4 * unit, to: last * unit, start: Starts(start.step_by(2).collect()) })
 }

@@ -12,6 +12,7 @@ use super::judge::{Alternatives, FoldErrors};
 use super::pool::{Beside, CachedHypotheses};
 use super::round::{EstimatedCause, FitState, Fitter};
 use super::types::{ClosedForm, Finding};
+use crate::criteria::closed_form::STARTS;
 use crate::effect::{DeclaredCause, DeclaredForm, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people};
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
@@ -25,9 +26,6 @@ pub(super) struct FormulaSearch<'a, 'b> {
     pub survey: &'b Survey<'a>,
     pub fitter: &'b Fitter<'b>,
 }
-
-/// Starts of a formula's shape numbers that are refined.
-const STARTS: usize = 4;
 
 /// A formula with its shape numbers where they fit best.
 struct Candidate {
@@ -135,7 +133,7 @@ impl FormulaSearch<'_, '_> {
         let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best start need not lead to the best shape.
-        let ends: Vec<Form> = starts.into_iter().take(STARTS).map(|(_, form)| beside.refined(form, self.survey)).collect();
+        let ends: Vec<Form> = starts.into_iter().take(*STARTS).map(|(_, form)| beside.refined(form, self.survey)).collect();
         let gains = beside.gains(&ends);
         let (_, form) = gains.into_iter().zip(ends).max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate { cause, form, price: cause.price() })

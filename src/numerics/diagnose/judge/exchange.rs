@@ -3,12 +3,11 @@
 use super::alternatives::Alternatives;
 use super::comparison::{ModelComparison, others};
 use super::fold_errors::{FoldErrors, FoldGain};
-use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
+use crate::criteria::judge::RIVALS;
+use crate::criteria::search::EQUIVALENT;
+use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Place, Unknown, follows};
-
-/// Rivals that are tried in place of a cause.
-pub(crate) const RIVALS: usize = 4;
+use crate::effect::{Place, follows, names};
 
 /// Exchanges or drops causes that make the folds worse; `set` holds the causes' positions in the pool, in their order.
 pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &ModelComparison) -> (FitState, Vec<FoldGain>) {
@@ -126,7 +125,7 @@ impl Contested {
             set.push(*h);
             set.sort_unstable();
             let prior_penalty = pool.prior_penalty[*h];
-            if tried.contains(&&pool.keys[*h]) || pool.bic(&set) - prior_penalty - self.fit > EQUIVALENT {
+            if tried.contains(&&pool.keys[*h]) || pool.bic(&set) - prior_penalty - self.fit > *EQUIVALENT {
                 continue;
             }
             tried.push(&pool.keys[*h]);
@@ -134,7 +133,7 @@ impl Contested {
             let form = pool.hypotheses[*h].form.clone();
             let cause = EstimatedCause::shrunk(form, pool.problem.robot, coefficients.unwrap_or_default());
             rivals.push(RivalOf { at: *h, cause, prior_penalty });
-            if rivals.len() == RIVALS {
+            if rivals.len() == *RIVALS {
                 break;
             }
         }
@@ -160,7 +159,7 @@ impl Contested {
         let Some(bare) = look(None) else { return Outcome::Unknown };
         // What has no name must prove itself: it has no physics to carry it to other points.
         let harmful = |bare: &FoldErrors| bare.is_better_than(seen);
-        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == Unknown::NAME && seen.gain_over(bare) < 0.0;
+        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == names::UNKNOWN && seen.gain_over(bare) < 0.0;
         // Folds must outweigh what was believed before them; what does harm has lost that right.
         let convinces = |rival: &RivalOf, errors: &FoldErrors| {
             let prejudice = if harmful(&bare) { 0.0 } else { rival.prior_penalty - self.prior_penalty };

@@ -1,12 +1,10 @@
 //! Errors of fitted rows under fits that did not see their pose, and whether they are smaller than those of another model.
 
+use crate::criteria::judge::{CLEARLY, FOLDS, WORSE};
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
 use crate::estimate::{ErrorScale, FoldKind, Session, autocorrelation_time, dealt, gather};
 use std::collections::BTreeMap;
-
-/// Parts of the rows that were fitted, the same for every model that is compared.
-pub(crate) const FOLDS: usize = 5;
 
 /// Causes of one effect and place, and what the rms (m) of the folds falls by with them.
 #[derive(Debug, Clone)]
@@ -18,15 +16,13 @@ pub(crate) struct FoldGain {
 
 /// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
 pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
-    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
-    let random = FoldKind::Random(fitter.question.seed);
-    let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
-    dealt(kind, &now.session(fitter), FOLDS)
+    dealt(kind(fitter), &now.session(fitter), *FOLDS)
 }
 
-/// A model that is worse by this share, and by so many standard errors, is worse.
-const WORSE: f64 = 0.03;
-const CLEARLY: f64 = 2.0;
+/// Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
+fn kind(fitter: &Fitter) -> FoldKind {
+    if fitter.correlated.is_some() { FoldKind::Blocks } else { FoldKind::Random(fitter.question.seed) }
+}
 
 /// Errors of the rows that were fitted.
 pub(crate) struct FoldErrors {
@@ -41,8 +37,17 @@ pub(crate) struct FoldErrors {
 impl FoldErrors {
     /// `None` where the poses are too few for folds.
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
+        Self::of_folds(kind(fitter), now, fitter)
+    }
+
+    /// Where each fold is a stretch of the recording, the first and the last among them. `None` where the poses are too few.
+    pub fn of_stretches(now: &FitState, fitter: &Fitter) -> Option<Self> {
+        Self::of_folds(FoldKind::Blocks, now, fitter)
+    }
+
+    fn of_folds(kind: FoldKind, now: &FitState, fitter: &Fitter) -> Option<Self> {
         let session = now.session(fitter);
-        let folds = folds(now, fitter)?;
+        let folds = dealt(kind, &session, *FOLDS)?;
         Some(Self::gathered(&session, &folds, &session.without_each(&folds, fitter.scale), fitter.scale))
     }
 
@@ -72,7 +77,7 @@ impl FoldErrors {
     /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
     pub fn is_better_than(&self, other: &Self) -> bool {
         let [own, theirs] = self.rms_beside(other);
-        own < theirs * (1.0 - WORSE) && self.fall_from(other) > CLEARLY
+        own < theirs * (1.0 - *WORSE) && self.fall_from(other) > *CLEARLY
     }
 
     /// The rms of both at the rows that both were fitted to.

@@ -9,8 +9,7 @@ mod withdraw;
 
 pub(crate) use alternatives::Alternatives;
 pub(crate) use comparison::ModelComparison;
-pub(crate) use exchange::RIVALS;
-pub(crate) use fold_errors::{FOLDS, FoldErrors, FoldGain};
+pub(crate) use fold_errors::{FoldErrors, FoldGain};
 
 use super::round::FitState;
 

@@ -4,6 +4,7 @@
 //! With x ~ N(0, a^2 V): ln E(a) = 1/2 sum_k [ z_k^2 a^2 s_k / (1 + a^2 s_k) - ln(1 + a^2 s_k) ], where s and z are eigenvalues and projected
 //! gradient of V^1/2 G V^1/2 (computed on its tridiagonal form); the amplitude `a` is integrated over a logarithmic grid, since the largest evidence alone is biased upwards.
 
+use crate::criteria::open_world::NEGLIGIBLE;
 use crate::diagnose::pool::dot;
 use nalgebra::{DMatrix, DVector};
 
@@ -11,8 +12,6 @@ use nalgebra::{DMatrix, DVector};
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 1e-2;
 const AMPLITUDES: usize = 29;
-/// Prior variances below this share of the largest.
-const NEGLIGIBLE: f64 = 1e-3;
 
 /// What a group of columns says.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +37,7 @@ impl GroupEvidence {
 pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, variances: &[f64]) -> GroupEvidence {
     // What hardly varies beforehand costs time and says nothing.
     let most = variances.iter().copied().fold(0.0, f64::max);
-    let kept: Vec<usize> = (0..variances.len()).filter(|k| variances[*k] > NEGLIGIBLE * most).collect();
+    let kept: Vec<usize> = (0..variances.len()).filter(|k| variances[*k] > *NEGLIGIBLE * most).collect();
     let roots: Vec<f64> = kept.iter().map(|k| variances[*k].sqrt()).collect();
     let count = roots.len();
     let scaled = DMatrix::from_fn(count, count, |i, j| roots[i] * gram[(kept[i], kept[j])] * roots[j]);

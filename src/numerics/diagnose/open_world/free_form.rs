@@ -5,20 +5,13 @@ use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows};
 use super::groups::{FreeGroup, GroupColumns};
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
+use crate::criteria::open_world::{CLOSER, GROUPS, LEVELS, PAYS};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Groups of a place at most.
-const GROUPS: usize = 4;
-/// ln of the evidence by which a further group must pay for itself, beyond the price of its choice.
-const PAYS: f64 = 1.0;
-/// How often the number of a group's variable is halved in its step.
-const LEVELS: i32 = 4;
 /// Columns of groups that are projected at once.
 const COLUMNS: usize = 128;
-/// Groups whose shorter lengths are looked at.
-const CLOSER: usize = 10;
 
 /// A group in a free form.
 #[derive(Debug, Clone)]
@@ -142,7 +135,7 @@ impl PlaceGroups {
         let mut out: Vec<(GroupEvidence, usize)> = (0..self.groups.len()).map(first).collect();
         let mut order: Vec<usize> = (0..out.len()).filter(|g| lengths(*g) > 2).collect();
         order.sort_by(|a, b| out[*b].0.log.total_cmp(&out[*a].0.log));
-        for g in order.into_iter().take(CLOSER) {
+        for g in order.into_iter().take(*CLOSER) {
             out[g] = closest(&(0..lengths(g)).map(|length| of(g, length)).collect::<Vec<_>>());
         }
         out
@@ -157,7 +150,7 @@ impl PlaceGroups {
 
     /// Moves the number of a group's variable to where its evidence is largest.
     fn refine(&mut self, g: usize, mut log: f64, state: &KnownCauses, columns: &mut GroupColumns, around: &AroundGroups) {
-        for level in 0..LEVELS {
+        for level in 0..*LEVELS {
             let first = self.groups.len();
             let near = columns.near(&self.groups[g].group, level);
             self.take(near, columns, around, true);
@@ -193,7 +186,7 @@ impl PlaceGroups {
         let (mut now, mut terms) = (state.clone(), Vec::new());
         let mut log = f64::NEG_INFINITY;
         let mut columns = GroupColumns::new(around.frame);
-        for step in 0..GROUPS {
+        for step in 0..*GROUPS {
             let scan = self.scan(&now);
             let paid = |g: usize| scan[g].0.log - self.price(g);
             let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
@@ -203,7 +196,7 @@ impl PlaceGroups {
                 if paid(best) < 0.0 {
                     break;
                 }
-            } else if paid(best) < PAYS {
+            } else if paid(best) < *PAYS {
                 break;
             } else {
                 log += paid(best);

@@ -1,30 +1,13 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use crate::criteria::open_world::{
+    COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
+};
+use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
-/// Correlation lengths of smooth functions, shares of their variable's range.
-const LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02];
-/// Cosines of the turn of a joint over its own angle as gears make it; over a motion's own angle and over time; and over what else there is.
-const FINEST: usize = 48;
-const FINE: usize = 16;
-const COARSE: usize = 8;
-/// Of what is tried with several numbers; the best of them is looked at again with [`FINE`] ones.
-const SKETCH: usize = 4;
-/// Cosines of each of two variables.
-const EACH: usize = 4;
-/// Cosines by which one of two variables is told from the other, and the share of its variance above which it is: what follows the other shows
-/// no product of both.
-const TOLD_BY: usize = 6;
-const TOLD: f64 = 0.7;
-/// Cosines have no slope at the ends of their range: it is wider than the rows' by this share at either end.
-const MARGIN: f64 = 0.1;
-/// A variable of no more values than this is a number of its own, not a range.
-const LEVELS: usize = 3;
-/// Steps in time that are tried.
-const STEPS: usize = 40;
 /// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
 const ARROWS: [[i8; 3]; 13] = [
     [1, 0, 0],
@@ -41,9 +24,6 @@ const ARROWS: [[i8; 3]; 13] = [
     [1, -1, 1],
     [-1, 1, 1],
 ];
-/// Limits at which what sticks slips, shares of a joint's range, and times (s) in which a travel fades.
-const LIMITS: [f64; 3] = [0.07, 0.14, 0.28];
-const FADING: [f64; 3] = [15.0, 35.0, 80.0];
 /// Shorter links (m) have no free form of their own.
 const SHORT: f64 = 1e-3;
 
@@ -59,6 +39,12 @@ pub(super) struct FreeGroup {
 impl FreeGroup {
     pub fn place(&self) -> Place {
         self.motion.place()
+    }
+
+    /// Whether it depends on what drifts with the recording: rows after it are beyond all that was seen.
+    pub fn follows_time(&self) -> bool {
+        let drifts = |of: Variable| matches!(of, Variable::Time | Variable::Temperature | Variable::Lagging { .. });
+        self.law.factors().any(|factor| drifts(factor.of))
     }
 
     /// As what may join the model: a law without a name.
@@ -100,14 +86,14 @@ impl FreeGroup {
 fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
     let Basis::Cosines { count, .. } = *basis else { return vec![vec![1.0; basis.count()]] };
     let lengths = match count {
-        FINEST.. => &LENGTHS[..],
-        FINE.. => &LENGTHS[..4],
-        COARSE.. => &LENGTHS[..3],
+        _ if count >= *FINEST => &LENGTHS[..],
+        _ if count >= *FINE => &LENGTHS[..4],
+        _ if count >= *COARSE => &LENGTHS[..3],
         _ => &LENGTHS[..2],
     };
     let density = |length: f64| {
         let of = |k: usize| {
-            let wave = PI * k as f64 * length / (1.0 + 2.0 * MARGIN);
+            let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
             1.0 / (3.0 + wave * wave).powi(2)
         };
         let all: Vec<f64> = (1..=count).map(of).collect();
@@ -165,8 +151,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             if !distinct.iter().any(|other| (other - value).abs() < 1e-9 * span) {
                 distinct.push(*value);
             }
-            if distinct.len() > LEVELS {
-                return Some(Basis::Cosines { low: low - MARGIN * span, high: high + MARGIN * span, count });
+            if distinct.len() > *NUMBERS {
+                return Some(Basis::Cosines { low: low - *MARGIN * span, high: high + *MARGIN * span, count });
             }
         }
         Some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
@@ -174,7 +160,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
 
     /// The share of a variable's variance that a smooth function of another one tells.
     fn follows(&mut self, of: Variable, by: Variable) -> f64 {
-        let Some(told) = self.functions(by, TOLD_BY) else { return 0.0 };
+        let Some(told) = self.functions(by, *TOLD_BY) else { return 0.0 };
         let Some(values) = self.values(of).map(DVector::from_column_slice) else { return 0.0 };
         let columns = told.iter().map(|column| DVector::from_column_slice(column));
         let ones = std::iter::once(DVector::from_element(values.len(), 1.0));
@@ -206,7 +192,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
                 }
             }
             if steps(motion) {
-                let all: Vec<f64> = survey.changes(STEPS).collect();
+                let all: Vec<f64> = survey.changes(*STEPS).collect();
                 let step =
                     |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
                 out.extend(all.iter().map(step));
@@ -233,7 +219,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             Variable::Recent { joint, time } => factors.map(|by| Variable::Recent { joint, time: time * by }).to_vec(),
             _ => Vec::new(),
         };
-        let one = |of: Variable| Some(FreeGroup { law: Law::new(of, self.basis(of, FINE)?), ..*group });
+        let one = |of: Variable| Some(FreeGroup { law: Law::new(of, self.basis(of, *FINE)?), ..*group });
         let first = (level == 0 && !variables.is_empty()).then_some(group.law.first.of);
         first.into_iter().chain(variables).filter_map(one).collect()
     }
@@ -253,9 +239,9 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
 
     /// The product of two variables, where the rows show one: neither follows the other.
     pub fn product(&mut self, motion: Motion, [first, second]: [Variable; 2], of: usize) -> Option<FreeGroup> {
-        let law = Law::new(first, self.basis(first, EACH)?).times(second, self.basis(second, EACH)?);
+        let law = Law::new(first, self.basis(first, *EACH)?).times(second, self.basis(second, *EACH)?);
         let told = self.follows(first, second).max(self.follows(second, first));
-        (told <= TOLD).then_some(FreeGroup { motion, law, of })
+        (told <= *TOLD).then_some(FreeGroup { motion, law, of })
     }
 }
 
@@ -304,24 +290,25 @@ fn length(survey: &Survey, link: usize) -> f64 {
 /// The motions of a place, and what each may follow with how many cosines.
 pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
-    let angles = |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { FINE } else { COARSE }));
-    let passing = || [(Variable::Time, FINE), (Variable::Temperature, COARSE), (Variable::Payload, COARSE)].into_iter();
+    let angles =
+        |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
+    let passing = || [(Variable::Time, *FINE), (Variable::Temperature, *COARSE), (Variable::Payload, *COARSE)].into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
-    let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, COARSE));
+    let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
     // What a joint's travel leaves behind.
     let moved = |joint: usize| {
         let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
         let fades = FADING.map(|time| Variable::Recent { joint, time });
         let clocked = survey.data.has_clock();
         let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
-        all.map(|of| (of, if alike(of) > 1 { SKETCH } else { COARSE }))
+        all.map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }))
     };
-    let space = || arrows().map(|along| (Variable::Position { along }, SKETCH));
+    let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
         Place::Joint(joint) => {
             let own: Vec<_> =
                 angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain(moved(joint)).chain(space()).collect();
-            let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { FINEST } else { *count }));
+            let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { *FINEST } else { *count }));
             let mut out = vec![(Motion::Joint { joint }, finest.collect())];
             if survey.robot.is_revolute(joint) {
                 out.push((Motion::Axis { joint, about: None, turning: false }, own.clone()));
@@ -337,13 +324,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
             vec![(Motion::Links { first: link, last: link }, own.clone()), (Motion::Bend { link }, own)]
         }
         Place::Tracker => {
-            let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, FINE));
-            let space = arrows().map(|along| (Variable::Sighted { along }, SKETCH));
+            let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
+            let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
             let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
         Place::Tool => {
-            let gravity = (0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, COARSE));
+            let gravity = (0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, *COARSE));
             let last = joints.saturating_sub(1);
             let own: Vec<_> =
                 angles(last).chain(passing()).chain(sides()).chain(gravity).chain(moved(last)).chain(space()).collect();
@@ -361,13 +348,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
 fn name_of(group: &FreeGroup) -> Option<&'static str> {
     let first = group.law.first;
     match (group.motion, first.of, group.law.times) {
-        (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some("backlash"),
-        (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some("zero_shift"),
-        (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some("base_shift"),
-        (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some("tool_shift"),
+        (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some(names::BACKLASH),
+        (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some(names::ZERO_SHIFT),
+        (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some(names::BASE_SHIFT),
+        (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some(names::TOOL_SHIFT),
         (Motion::Joint { joint }, Variable::Angle { joint: a }, Some(times)) => {
             let Variable::Angle { joint: b } = times.of else { return None };
-            ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some("cable_drag")
+            ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some(names::CABLE_DRAG)
         }
         _ => None,
     }

@@ -7,23 +7,14 @@ use super::names::{
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
+use crate::criteria::open_world::{LOUDER, SIZE, STRONG, WORSE};
+use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::diagnose::words::{FindingGroups, FindingKey, groups};
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// ln of the evidence of a free form beside everything, over the number of places, above which it joins; and by which one is better than all
-/// causes together where it stands in their place.
-const STRONG: f64 = 3.0;
-/// ln of what each cause's size costs beside a known one.
-const SIZE: f64 = 3.0;
-/// What goes may cost this share of the folds' rms.
-const WORSE: f64 = 0.01;
-/// A noise that is larger than stated by less than this share, in squares, is the stated one.
-const LOUDER: f64 = 1.05;
 
 /// A judged model with its rows, projected.
 pub(super) struct Sighted<'v> {
@@ -84,7 +75,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
         let louder = louder.max(sight.fitter.least_of_the_noise());
-        if louder > LOUDER || louder < 1.0 / LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
+        if louder > *LOUDER || louder < 1.0 / *LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);
             beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
@@ -116,17 +107,17 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let best = survey_places(&[(none, None)], &self.groups, &self.around).remove(0).best.into_iter().next()?;
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
-        let price: f64 = set.iter().map(|h| case.price(*h) - listed + SIZE).sum();
+        let price: f64 = set.iter().map(|h| case.price(*h) - listed + *SIZE).sum();
         let more = best.log + open - (self.whole.log() - price);
         let all: Vec<usize> = (0..set.len()).collect();
         let sentence = || format!("a free form at {} says more than all causes: {more:.0} nats of evidence", best.place);
-        (more > STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?
+        (more > *STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?
     }
 
     /// A law of the list or the free form of a place beside everything.
     pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
         let price = (self.beside.logs.len().max(1) as f64).ln();
-        let form = self.beside.best.iter().find(|form| form.log - price > STRONG && !refused.contains(&form.place))?;
+        let form = self.beside.best.iter().find(|form| form.log - price > *STRONG && !refused.contains(&form.place))?;
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let laws = case.listed(&[], &self.whole);
@@ -159,6 +150,11 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             key: *key,
             members: members.clone(),
             own: members.iter().flat_map(|i| own(*i, members.len())).collect(),
+            lawful: members
+                .iter()
+                .filter(|i| !causes[**i].form.cause().is_nameless())
+                .flat_map(|i| own(*i, members.len()))
+                .collect(),
         };
         let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();
         let rest = |own: &NamedFinding| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));
@@ -186,7 +182,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let dropped = || {
             contested.iter().filter(|(_, own)| own.odds.log < 0.0).find_map(|((effect, place), own)| {
                 let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
-                self.change(&own.members, WORSE).free(&[], sentence)
+                self.change(&own.members, *WORSE).free(&[], sentence)
             })
         };
         christened.or_else(freed).or_else(dropped)

@@ -4,27 +4,14 @@ use super::evidence::{evidence, log_sum};
 use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
+use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NEARLY, NOTHING, PLACES, RIVALS};
+use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::diagnose::words::FindingKey;
-use crate::effect::{Place, Unknown};
+use crate::effect::{Place, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-
-/// Prior odds that nothing is there.
-const NOTHING: f64 = 0.5;
-/// Rivals whose evidence is asked.
-const RIVALS: usize = 12;
-/// A law of the list is never quite the true one: what a free form at its own place adds is its finer shape below this share of both.
-const FINER: f64 = 0.1;
-/// ln of the evidence by which a free form must be better than a name with a free form beside it, to stand in its place.
-const CLEARLY: f64 = 3.0;
-/// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of names that were wrong
-/// where it was sure of them.
-const MISLED: f64 = 0.02;
-/// Places at which a free form is asked with more than one group.
-const CLOSER: usize = 2;
 
 /// What is said against a finding's name.
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +67,7 @@ pub(super) fn survey_places(
     for (s, (_, own)) in states.iter().enumerate() {
         let mut order: Vec<usize> = (0..all.len()).collect();
         order.sort_by(|a, b| firsts[*b][s].total_cmp(&firsts[*a][s]));
-        let mut chosen: Vec<usize> = order.into_iter().take(CLOSER).filter(|p| firsts[*p][s] > 0.0).collect();
+        let mut chosen: Vec<usize> = order.into_iter().take(*PLACES).filter(|p| firsts[*p][s] > 0.0).collect();
         chosen.extend((0..all.len()).filter(|p| Some(all[*p]) == *own && !chosen.contains(p)).collect::<Vec<_>>());
         wanted.extend(chosen.into_iter().map(|p| (p, s)));
     }
@@ -110,6 +97,8 @@ pub(super) struct NamedFinding {
     pub members: Vec<usize>,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
     pub own: Vec<(usize, f64)>,
+    /// Those of them that are of laws of the list.
+    pub lawful: Vec<(usize, f64)>,
 }
 
 /// What the judgement of a finding rests on.
@@ -132,19 +121,14 @@ impl NameCase<'_, '_, '_, '_> {
     ) -> ContestedName {
         let (effect, place) = named.key;
         let set = &self.judged.set;
-        let own = {
-            let columns = named.own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
-            let picked = self.around.causes.columns.select_columns(&columns);
-            let variances: Vec<f64> = named.own.iter().map(|(_, variance)| *variance).collect();
-            self.evidence_of(rest, &picked, &variances)
-        };
+        let own = self.evidence_of_causes(rest, &named.own);
         let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
         let [open, listed] = self.priors(instead.logs.len());
-        let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
+        let is_named = effect != names::UNKNOWN && self.around.without.iter().all(|name| name != effect);
         let mine = listed + own.log - price(&named.members);
         let best_beside = beside.best.first();
         let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);
-        let refined = beside.best.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
+        let refined = beside.best.iter().find(|form| form.place == place && more(form) < *FINER && form.log > 0.0);
         let mut names: Vec<(Place, f64)> = Vec::new();
         if is_named {
             names.push((place, mine));
@@ -152,10 +136,16 @@ impl NameCase<'_, '_, '_, '_> {
         }
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
-        let mut free: Vec<(Place, f64)> = instead.logs.iter().map(|(place, log)| (*place, open + log)).collect();
+        let free = instead.logs.iter().map(|(place, log)| (*place, open + log));
+        let (finer, mut free): (Vec<_>, Vec<_>) = if is_named && self.is_nearly_all(named, rest, &own, instead) {
+            free.partition(|(at, _)| *at == place)
+        } else {
+            (Vec::new(), free.collect())
+        };
+        names.extend(finer);
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
-        } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= FINER) {
+        } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= *FINER) {
             free.push((place, open + mine + form.log));
         }
         let logs = |of: &[(Place, f64)]| log_sum(&of.iter().map(|(_, log)| *log).collect::<Vec<_>>());
@@ -163,18 +153,34 @@ impl NameCase<'_, '_, '_, '_> {
             |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
         let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
         let odds = NameOdds {
-            none: (logs(&free) - all).exp().clamp(MISLED, 1.0 - MISLED),
+            none: (logs(&free) - all).exp().clamp(*MISLED, 1.0 - *MISLED),
             place: (log_sum(&[here(&names), here(&free)]) - all).exp(),
             log: own.log,
             share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
         };
         let alternative = instead.best.first().filter(|form| !form.terms.is_empty());
         let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
-        let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + CLEARLY).cloned();
+        let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + *CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
         ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+    }
+
+    /// Whether the named laws of a finding explain nearly all of what the free form at its place does instead of it.
+    fn is_nearly_all(&self, named: &NamedFinding, rest: &KnownCauses, own: &Own, instead: &SurveyedPlaces) -> bool {
+        let Some(form) = instead.best.iter().find(|form| form.place == named.key.1) else { return false };
+        let gain =
+            if named.lawful.len() < named.own.len() { self.evidence_of_causes(rest, &named.lawful).gain } else { own.gain };
+        gain > (1.0 - *NEARLY) * own.gain.max(form.gain)
+    }
+
+    /// Evidence and fall of the squared residual of some columns of the model's causes beside a state.
+    fn evidence_of_causes(&self, rest: &KnownCauses, own: &[(usize, f64)]) -> Own {
+        let columns = own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
+        let picked = self.around.causes.columns.select_columns(&columns);
+        let variances: Vec<f64> = own.iter().map(|(_, variance)| *variance).collect();
+        self.evidence_of(rest, &picked, &variances)
     }
 
     /// ln of a hypothesis' prior odds, negative; of what is called by a name only when it is fitted those of its kind and place.
@@ -229,7 +235,7 @@ impl NameCase<'_, '_, '_, '_> {
             let products = rest.of_columns(self.around.frame, &block.columns);
             let found = evidence(&products.gram, &products.gradient, &variances);
             out.push(LawOfTheList { key, at: *h, log: found.log - self.price(*h) });
-            if out.len() == RIVALS {
+            if out.len() == *RIVALS {
                 break;
             }
         }

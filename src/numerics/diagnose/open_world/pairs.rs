@@ -3,14 +3,8 @@
 use super::frame::ProjectedRows;
 use super::groups::{FreeGroup, GroupColumns, alike, motions};
 use super::state::KnownCauses;
+use crate::criteria::open_world::{LOOKED_AT, PICKED, STRUCTURED};
 use crate::effect::{Motion, Place, Survey, Variable};
-
-/// Functions of each variable that are looked at.
-const LOOKED_AT: usize = 3;
-/// Products of a motion that become groups.
-const PICKED: usize = 6;
-/// Mean square of what is left, over that of noise, below which nothing is looked for.
-const STRUCTURED: f64 = 1.1;
 
 /// Products that the residual beside some states points at, the best of every motion of a place.
 pub(super) fn pairs(
@@ -22,7 +16,7 @@ pub(super) fn pairs(
 ) -> Vec<FreeGroup> {
     let mean_square = |left: &[f64]| left.iter().map(|value| value * value).sum::<f64>() / left.len().max(1) as f64;
     let left: Vec<Vec<f64>> =
-        states.iter().map(|state| state.leaves(frame)).filter(|left| mean_square(left) > STRUCTURED).collect();
+        states.iter().map(|state| state.leaves(frame)).filter(|left| mean_square(left) > *STRUCTURED).collect();
     if left.is_empty() {
         return Vec::new();
     }
@@ -30,7 +24,7 @@ pub(super) fn pairs(
     for (motion, variables) in motions(place, survey) {
         let known = variables.iter().map(|(of, _)| *of).filter(|of| alike(*of) == 1);
         let known: Vec<(Variable, Vec<Vec<f64>>)> =
-            known.filter_map(|of| Some((of, columns.functions(of, LOOKED_AT)?))).collect();
+            known.filter_map(|of| Some((of, columns.functions(of, *LOOKED_AT)?))).collect();
         let seen = SeenMotion::of(motion, &left, frame);
         let mut scores: Vec<([usize; 2], f64)> = Vec::new();
         for (a, (_, first)) in known.iter().enumerate() {
@@ -42,7 +36,7 @@ pub(super) fn pairs(
         // What lowers the squared residual by less cannot pay for its choice.
         let price = 2.0 * (tried.max(1) as f64).ln();
         let of = |([a, b], _): &([usize; 2], f64)| columns.product(motion, [known[*a].0, known[*b].0], tried);
-        out.extend(scores.iter().filter(|(_, score)| *score > price).filter_map(of).take(PICKED));
+        out.extend(scores.iter().filter(|(_, score)| *score > price).filter_map(of).take(*PICKED));
     }
     out
 }

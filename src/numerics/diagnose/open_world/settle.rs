@@ -3,15 +3,14 @@
 use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
+use crate::criteria::open_world::ROUNDS;
+use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::diagnose::words::{FindingKey, of_the_open_world};
+use crate::diagnose::words::of_the_open_world;
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
-
-/// Changes of a model at most.
-const ROUNDS: usize = 6;
 
 /// A judged model with free forms, and the odds of its findings.
 pub(crate) struct Settled {
@@ -33,22 +32,22 @@ pub(crate) fn settle(
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
     let mut asked_alone = false;
-    for round in 0..=ROUNDS {
+    for round in 0..=*ROUNDS {
         tell(of_the_open_world(&judged.state));
         let view = RoundView::of(&judged.state, fitter);
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {
             let sight = Sighted::of(&view, &judged, fitter);
             let look = OpenWorldLook::of(&sight, pool, survey);
-            if round < ROUNDS && !std::mem::replace(&mut asked_alone, true) {
+            if round < *ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }
-            if round < ROUNDS && step.is_none() && joins {
+            if round < *ROUNDS && step.is_none() && joins {
                 step = look.joining(&mut refused);
             }
             if step.is_none() {
                 let contested = look.contested();
-                if round < ROUNDS {
+                if round < *ROUNDS {
                     step = look.exchange(&contested);
                 }
                 odds = contested.into_iter().map(|(key, own)| (key, own.odds)).collect();

@@ -37,8 +37,24 @@ impl ModelChange<'_, '_> {
         self.with(vec![law], vec![cause], sentence)
     }
 
-    /// With a free form, or nothing.
+    /// With a free form, or nothing. What follows time joins only where stretches of the recording that it did not see are predicted better
+    /// with it: the others go on without it.
     pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
+        let (passing, lasting): (Vec<FreeTerm>, Vec<FreeTerm>) =
+            terms.iter().cloned().partition(|term| term.group.follows_time());
+        let all = self.of_terms(terms, sentence.clone());
+        if passing.is_empty() || all.as_ref().is_some_and(|step| self.predicts_stretches(step)) {
+            return all;
+        }
+        if lasting.is_empty() { None } else { self.of_terms(&lasting, sentence) }
+    }
+
+    fn predicts_stretches(&self, step: &ModelStep) -> bool {
+        let [before, after] = [&self.judged.state, &step.state].map(|state| FoldErrors::of_stretches(state, self.fitter));
+        before.zip(after).is_some_and(|(before, after)| after.gain_over(&before) > 0.0)
+    }
+
+    fn of_terms(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
         let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis()).collect();
         let prior = |variance: &f64| Prior { mean: 0.0, sigma: variance.sqrt() };
         let cause = |(hypothesis, term): (&Hypothesis, &FreeTerm)| EstimatedCause {

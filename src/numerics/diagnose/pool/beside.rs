@@ -3,6 +3,7 @@
 use super::cached::CachedHypotheses;
 use super::cholesky::PivotedCholesky;
 use super::linear::dot;
+use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -12,10 +13,6 @@ use std::sync::OnceLock;
 
 /// Forms that one thread tries at once: fixed, so that no rounding depends on the number of threads.
 const FORMS: usize = 4;
-
-/// Levels of refinement of a shape, and how many may bring nothing.
-const LEVELS: i32 = 10;
-const IDLE: usize = 3;
 
 /// A set of hypotheses and the base model, beside which forms are tried.
 pub(crate) struct Beside<'p, 'a> {
@@ -64,14 +61,14 @@ impl<'p, 'a> Beside<'p, 'a> {
     pub fn refined(&self, mut form: Form, survey: &Survey) -> Form {
         let mut most = self.gains(std::slice::from_ref(&form))[0];
         let mut idle = 0;
-        for level in 0..LEVELS {
+        for level in 0..*LEVELS {
             let near = form.near(survey, level);
             let gains = self.gains(&near);
             match gains.into_iter().zip(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
                 _ => idle += 1,
             }
-            if idle >= IDLE {
+            if idle >= *IDLE {
                 break;
             }
         }

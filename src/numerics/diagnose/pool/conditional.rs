@@ -4,14 +4,13 @@ use super::cholesky::PivotedCholesky;
 use super::criterion::fall;
 use super::hypotheses::HypothesisSet;
 use super::linear::{INVISIBLE, dot};
+use crate::criteria::search::ROWS_EACH;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatMut, MatRef, Par, Side};
 use rayon::prelude::*;
 
 /// Columns whose shares one thread computes at once.
 const COLUMNS: usize = 256;
-/// A group may have at most one parameter for so many residual rows.
-const ROWS_EACH: usize = 4;
 
 /// Products of one column of a set with all columns of the pool.
 pub(super) struct SetProducts<'a> {
@@ -244,7 +243,7 @@ impl Conditional {
     /// Whether a hypothesis could join this set.
     pub fn admits(&self, pool: &HypothesisSet, h: usize) -> bool {
         let rows = pool.residual_rows.saturating_sub(pool.rank() + self.rank);
-        let small = ROWS_EACH * (pool.first[h + 1] - pool.first[h]) <= rows;
+        let small = *ROWS_EACH * (pool.first[h + 1] - pool.first[h]) <= rows;
         let parted = pool.hypotheses[h].inherits && !pool.has_parent(h, &self.set);
         small && !parted && !self.set.iter().any(|k| pool.keys[*k] == pool.keys[h])
     }

@@ -2,13 +2,8 @@
 
 use super::hypotheses::HypothesisSet;
 use super::solve::Solution;
+use crate::criteria::search::IMPLAUSIBLE;
 use crate::effect::{Hypothesis, follows};
-
-/// Explanations whose criterion is this close fit equally well (Kass and Raftery, 1995).
-pub(crate) const EQUIVALENT: f64 = 6.0;
-
-/// -2 ln of the odds of a sign or size that physics forbids.
-const IMPLAUSIBLE: f64 = 40.0;
 
 /// Fall of the criterion by `rank` more parameters that lower the squared residual by `gain`.
 pub(super) fn fall(n: f64, square: f64, gain: f64, rank: usize, prior_penalty: f64) -> f64 {
@@ -58,6 +53,6 @@ impl HypothesisSet<'_> {
             let error = if suspicious { solution.error(*column) } else { 0.0 };
             (positive && **value < -2.0 * error) || value.abs() - 2.0 * error > largest
         });
-        IMPLAUSIBLE * (wrong.count() + against) as f64
+        *IMPLAUSIBLE * (wrong.count() + against) as f64
     }
 }

@@ -3,13 +3,11 @@
 //! Effects are small, so that the directions in which they move a point change by thousandths from round to round; what is left changes
 //! much, and is looked at anew. What is chosen is fitted in the whole model.
 
+use crate::criteria::search::SAME;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{Form, Hypothesis};
 use faer::Mat;
 use std::collections::HashMap;
-
-/// A compliance that changed by more than this share changes what loads do.
-const SAME: f64 = 0.01;
 
 /// The list of a round with its columns.
 pub(crate) struct EarlierPool {
@@ -43,7 +41,7 @@ impl EarlierPool {
     /// Whether it may stand for the pool of another round: the same rows, no currents, whose weight is that of a residual, and joints that
     /// yield as before.
     pub fn serves(&self, problem: &WhitenedProblem, compliance: &[f64]) -> bool {
-        let same = |(now, before): (&f64, &f64)| (now - before).abs() <= SAME * before.abs();
+        let same = |(now, before): (&f64, &f64)| (now - before).abs() <= *SAME * before.abs();
         let readings_alone = problem.residual_rows() == problem.of_readings().len();
         readings_alone && self.rows == problem.rows && compliance.iter().zip(&self.compliance).all(same)
     }

@@ -15,7 +15,6 @@ mod solve;
 pub(crate) use beside::Beside;
 pub(crate) use cached::CachedHypotheses;
 pub(crate) use conditional::Conditional;
-pub(crate) use criterion::EQUIVALENT;
 pub(crate) use earlier::EarlierPool;
 pub(crate) use hypotheses::HypothesisSet;
 pub(crate) use linear::{dot, orthonormal, project};

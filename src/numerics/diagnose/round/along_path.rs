@@ -1,11 +1,9 @@
 //! Rows along a path: each pose is near the one before it, so that what changes with the pose looks like noise that is correlated in time.
 
+use crate::criteria::noise::NEAR;
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::robot::Measurements;
 use crate::statistics::nearest;
-
-/// Rows follow a path where the middle step from row to row is below this share of the middle distance of any two poses.
-const NEAR: f64 = 0.35;
 
 /// How far correlation on a path has been looked into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +34,7 @@ pub(super) fn follow_a_path(data: &Measurements, rows: &[usize]) -> bool {
     let half = measured.len() / 2;
     let mut any: Vec<f64> = measured.iter().zip(&measured[half..]).map(|(a, b)| apart(*a, *b)).collect();
     match (nearest(&mut steps, 0.5), nearest(&mut any, 0.5)) {
-        (Some(step), Some(any)) => step < NEAR * any,
+        (Some(step), Some(any)) => step < *NEAR * any,
         _ => false,
     }
 }

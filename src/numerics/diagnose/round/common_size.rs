@@ -5,26 +5,19 @@
 //! logarithm of the evidence is half the sum over eigenvalues p of P of b^2 / (p + 1/s^2) - ln(1 + s^2 p).
 
 use super::fit_state::{EstimatedCause, FitState, Fitter};
+use crate::criteria::noise::{AGAINST, BESIDE, FITS, SHOWN};
 use crate::estimate::{Covariance, Model, ParameterStatus, Prior};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// The size is searched from the plausible one downwards over so many e-folds, in so many steps.
 const FOLDS: f64 = 12.0;
 const STEPS: usize = 120;
-/// Sizes are asked anew after each fit with priors, so often at most.
-const FITS: usize = 2;
-/// Twice the logarithm of the evidence, below the greatest, at which a size is spoken against.
-const AGAINST: f64 = 6.0;
-/// A combination this many times (squared) its standard error is shown by the rows.
-const SHOWN: f64 = 9.0;
-/// A coefficient is hardly ever smaller than this share of the largest that is not of the family: the arm's own lines bend a little.
-const BESIDE: f64 = 0.2;
 
 impl Fitter<'_> {
     /// The state with coefficients of one size held to the size that the rows show; itself where no cause has any.
     pub fn held_to_a_common_size(&self, state: FitState) -> FitState {
         let mut now = state;
-        for _ in 0..FITS {
+        for _ in 0..*FITS {
             let Some(causes) = held(&now) else { return now };
             now = self.fit(&now.model, causes);
         }
@@ -49,7 +42,7 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
         let others = range.clone().filter(|k| !own.contains(k) && is_shown(state, *k)).map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
-        let size = if most > 0.0 { size.clamp(BESIDE * most, most) } else { size };
+        let size = if most > 0.0 { size.clamp(*BESIDE * most, most) } else { size };
         any = true;
         let sigma = |k: usize| match specs[k].prior_sigma {
             _ if family.contains(&k) => size,
@@ -67,7 +60,7 @@ fn is_shown(state: &FitState, k: usize) -> bool {
         ParameterStatus::Free(sigma) => sigma,
         _ => f64::INFINITY,
     };
-    state.model.x[k].powi(2) > SHOWN * error * error
+    state.model.x[k].powi(2) > *SHOWN * error * error
 }
 
 /// The largest size (SI) that the evidence allows, at most `plausible`; none where the parameters were not all estimated.
@@ -88,9 +81,9 @@ fn size(model: &Model, covariance: &Covariance, own: &[usize], plausible: f64) -
     let all: Vec<(f64, f64)> = sizes.map(|size| (size, evidence(size))).collect();
     let best = all.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
     // From the plausible size downwards: the loosest that rows do not speak against.
-    let loosest = all.into_iter().find(|(_, evidence)| *evidence >= best - AGAINST).map(|(size, _)| size)?;
+    let loosest = all.into_iter().find(|(_, evidence)| *evidence >= best - *AGAINST).map(|(size, _)| size)?;
     // What rows clearly show is as large as it is.
     let shown =
-        eigenvalues.iter().zip(along.iter()).filter(|(p, b)| **p > 0.0 && **b * **b > SHOWN * **p).map(|(p, b)| (b / p).abs());
+        eigenvalues.iter().zip(along.iter()).filter(|(p, b)| **p > 0.0 && **b * **b > *SHOWN * **p).map(|(p, b)| (b / p).abs());
     Some(shown.fold(loosest, f64::max).min(plausible))
 }

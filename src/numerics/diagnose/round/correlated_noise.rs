@@ -7,20 +7,13 @@
 use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
+use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
-
-/// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
-const PLAIN: f64 = 20.0;
-/// Causes that follow time must be better than correlated noise by strong evidence: such noise is everywhere.
-const CLEARER: f64 = 8.0;
-/// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree of
-/// freedom): too short a noise makes causes of noise.
-const AS_GOOD: f64 = 3.84;
 
 /// What noise does from row to row, if the settled model shows it to be otherwise than believed.
 pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<CorrelationChange> {
@@ -42,18 +35,18 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
         // What noise alone explains as well has no other name.
         let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().map(self::numbers).sum::<usize>() as f64;
         let (alone, of_noise) = Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()]).likeliest();
-        let keeps_causes = best + price < alone - PLAIN;
+        let keeps_causes = best + price < alone - *PLAIN;
         return Some(CorrelationChange { noise: if keeps_causes { noise } else { of_noise }, keeps_causes });
     }
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        if cost < best.min(believed) + CLEARER && other.is_some() {
+        if cost < best.min(believed) + *CLEARER && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
     }
-    (best < believed - PLAIN && noise != fitter.correlated).then(|| change(noise))
+    (best < believed - *PLAIN && noise != fitter.correlated).then(|| change(noise))
 }
 
 fn follows_time(form: &Form) -> bool {
@@ -128,7 +121,7 @@ impl<'a> Regression<'a> {
         let all: Vec<Option<AutocorrelatedNoise>> = AutocorrelatedNoise::all().collect();
         let costs: Vec<f64> = all.par_iter().map(|noise| self.cost(*noise)).collect();
         let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let as_good = all.into_iter().zip(costs).filter(|(_, cost)| *cost < best + AS_GOOD).map(|(noise, _)| noise);
+        let as_good = all.into_iter().zip(costs).filter(|(_, cost)| *cost < best + *AS_GOOD).map(|(noise, _)| noise);
         let length = |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
         (best, as_good.max_by(|a, b| length(a).total_cmp(&length(b))).flatten())
     }

@@ -2,10 +2,11 @@
 
 use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
-use super::noise::{JointSpread, REPEATS, RepeatPairs, by_residual};
+use super::noise::{JointSpread, RepeatPairs, by_residual};
+use crate::criteria::noise::{ESTIMATES, GEOMETRY, REPEATS, SETTLED, SLOW};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, names, whole};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
@@ -37,10 +38,6 @@ pub(crate) struct EstimatedCause {
 
 /// The scale of a curve's coefficients in medians of their size: twice that of normal ones.
 const TYPICAL: f64 = 2.0 * 1.4826;
-/// Cosines of a curve of less than two periods over its range are all but geometry, which alone carries on beyond the range: they are
-/// held down to this share.
-const SLOW: usize = 3;
-const GEOMETRY: f64 = 0.2;
 
 impl EstimatedCause {
     /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or
@@ -53,7 +50,7 @@ impl EstimatedCause {
         let mut sizes: Vec<f64> = coefficients[curve.clone()].iter().map(|value| value.abs()).collect();
         let middle = sizes.len() / 2;
         let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        let share = |k: usize| if k < curve.start + SLOW { GEOMETRY } else { 1.0 };
+        let share = |k: usize| if k < curve.start + *SLOW { *GEOMETRY } else { 1.0 };
         let of_curve = |k: usize, plausible: f64| (share(k) * plausible.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
         let sigma = |k: usize, spec: ParameterSpec| match held {
             Some((ref numbers, sigma)) if numbers.contains(&k) => sigma,
@@ -104,12 +101,6 @@ pub(crate) struct Fitter<'a> {
     on_path: PathCorrelation,
 }
 
-/// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
-const ESTIMATES: usize = 3;
-
-/// A repeatability that changes by less than this share is settled.
-const SETTLED: f64 = 0.25;
-
 impl<'a> Fitter<'a> {
     /// The base model fitted, with the noise that repeats show.
     pub fn start(question: &'a Question<'a>) -> (Self, FitState) {
@@ -149,7 +140,7 @@ impl<'a> Fitter<'a> {
     /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
     pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
         let FitState { model, fitted, screening, .. } = settled;
-        let pairs = (self.repeatability.repeats >= REPEATS).then(|| RepeatPairs::of(&self.data, &screening.kept));
+        let pairs = (self.repeatability.repeats >= *REPEATS).then(|| RepeatPairs::of(&self.data, &screening.kept));
         if self.asked || pairs.as_ref().is_some_and(|pairs| !pairs.are_returns) {
             return None;
         }
@@ -158,7 +149,7 @@ impl<'a> Fitter<'a> {
             None => by_residual(model, fitted, &screening.kept, &self.data, &self.spread),
         };
         let now = self.repeatability.sigma;
-        ((other - now).abs() > SETTLED * other.max(now)).then_some(other)
+        ((other - now).abs() > *SETTLED * other.max(now)).then_some(other)
     }
 
     /// The share, in squares, of the noise that its statement and repeats show, whatever a residual was said to be.
@@ -181,7 +172,7 @@ impl<'a> Fitter<'a> {
 
     /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.
     pub fn may_estimate_correlation(&self, settled: &FitState) -> bool {
-        self.estimated < ESTIMATES && !self.data.in_motion(&settled.screening.kept)
+        self.estimated < *ESTIMATES && !self.data.in_motion(&settled.screening.kept)
     }
 
     /// Whether neighbours in time are neighbours in pose: there noise that lasts looks like a smooth function of any variable.
@@ -240,7 +231,8 @@ pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Ve
     let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
     let mut model = Model::nominal(from.robot.clone(), stack);
     let stack = model.stack.clone();
-    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != BaseFrame::NAME) {
+    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != names::BASE_FRAME)
+    {
         debug_assert!(effect.form().is_none());
         model.x[range].copy_from_slice(&from.x[found]);
     }

@@ -1,10 +1,8 @@
 //! When rounds of search and refit end.
 
 use super::fit_state::FitState;
+use crate::criteria::noise::ROUNDS;
 use crate::effect::Form;
-
-/// Most rounds of search and refit; it settles in two or three.
-const ROUNDS: usize = 6;
 
 /// Rounds so far.
 #[derive(Default)]
@@ -38,7 +36,7 @@ impl RoundHistory {
         // A set that comes back after another goes in circles: both fit equally well.
         let circles = !same && self.seen.contains(&forms);
         self.seen.push(forms);
-        if round >= ROUNDS || circles || now.screening.apart.is_some() {
+        if round >= *ROUNDS || circles || now.screening.apart.is_some() {
             RoundOutcome::Last
         } else if same && next.screening.kept == now.screening.kept {
             RoundOutcome::Settled

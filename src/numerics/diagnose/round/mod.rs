@@ -14,5 +14,4 @@ pub use base_model::BASE;
 pub(crate) use correlated_noise::correlation_left_by;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, with_causes};
 pub(crate) use history::{RoundHistory, RoundOutcome};
-pub(crate) use noise::REPEATS;
 pub(crate) use view::{RoundView, compliance};

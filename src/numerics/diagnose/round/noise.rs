@@ -1,5 +1,6 @@
 //! How well the joints repeat: one standard deviation for all, by maximum likelihood on repeats or on a residual without structure.
 
+use crate::criteria::noise::{CAP, FEW, REPEATS};
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model, Poses};
@@ -7,16 +8,10 @@ use crate::observation::{MeasurementKind, PointKind, Residual, kinds, values};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
-/// Repeats that make the noise known; with fewer it is taken from a residual without structure.
-pub(crate) const REPEATS: usize = 10;
-/// Fewer repeats than this say too little.
-const FEW: usize = 4;
 /// Standard deviations tried, rad.
 const LOWEST: f64 = 5e-7;
 const HIGHEST: f64 = 3e-4;
 const STEPS: usize = 60;
-/// A squared whitened error counts at most this much.
-const CAP: f64 = 30.0;
 
 /// Covariances per squared deviation of every joint, by row.
 #[derive(Default)]
@@ -120,12 +115,12 @@ impl RepeatPairs {
             between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
         };
         let (mut pairs, mut returns): (Vec<[usize; 2]>, Vec<[usize; 2]>) = pairs.partition(at_once);
-        if pairs.len() >= REPEATS || returns.is_empty() {
+        if pairs.len() >= *REPEATS || returns.is_empty() {
             pairs.sort_unstable_by_key(|pair| pair[1]);
             return Self { pairs, are_returns: false };
         }
         returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
-        returns.truncate(returns.len().div_ceil(2).max(REPEATS));
+        returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
         pairs.extend(returns);
         pairs.sort_unstable_by_key(|pair| pair[1]);
         Self { pairs, are_returns: true }
@@ -134,7 +129,7 @@ impl RepeatPairs {
     /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
     pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> JointRepeatability {
         let repeats = self.pairs.len();
-        if repeats < FEW {
+        if repeats < *FEW {
             return JointRepeatability { sigma: 0.0, repeats };
         }
         let predicted = model.predict(data);
@@ -193,8 +188,8 @@ fn likeliest(samples: &[(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)], evidence: f
     let cost = |sigma: f64| -> f64 {
         let one = |(error, fixed, varying): &(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)| {
             let covariance = fixed + varying * (sigma * sigma);
-            let square = covariance.try_inverse().map_or(CAP, |inverse| error.dot(&(inverse * error)));
-            square.min(CAP) + covariance.determinant().ln()
+            let square = covariance.try_inverse().map_or(*CAP, |inverse| error.dot(&(inverse * error)));
+            square.min(*CAP) + covariance.determinant().ln()
         };
         samples.iter().map(one).sum()
     };

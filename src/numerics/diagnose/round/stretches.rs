@@ -1,24 +1,19 @@
 //! Rows that say something of their own: which of them a search looks at, how many count as one, and where one pose ends.
 
+use crate::criteria::noise::{ALONE, SEARCHED, STRETCHES};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::autocorrelation_time;
 use crate::robot::Measurements;
-
-/// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
-const SEARCHED: usize = 800;
-/// Rows that count as fewer than this are independent; with fewer stretches than this signs by stretch say nothing.
-const ALONE: f64 = 1.2;
-const STRETCHES: usize = 40;
 
 /// Rows that the search looks at: all but those of the recording's first stop, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
 /// that keeps no step with any design of the recording; the model is fitted to all.
 pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
     let rows: Vec<usize> = rows.iter().copied().filter(|row| !data.at_first_stop(*row)).collect();
-    if rows.len() <= SEARCHED {
+    if rows.len() <= *SEARCHED {
         return rows;
     }
     // Multiples of the golden ratio fill the unit interval evenly (Kuipers and Niederreiter, 1974).
-    let share = SEARCHED as f64 / rows.len() as f64;
+    let share = *SEARCHED as f64 / rows.len() as f64;
     let taken = |i: &usize| (*i as f64 * 0.618_033_988_749_895).fract() < share;
     (0..rows.len()).filter(taken).map(|i| rows[i]).collect()
 }
@@ -28,13 +23,13 @@ pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let rows = &problem.rows;
     let moving = problem.width().filter(|_| problem.data.in_motion(rows));
     let time = moving.map_or(1.0, |width| autocorrelation_time(problem.of_readings(), width));
-    if time < ALONE { 1.0 } else { time.min(rows.len() as f64 / STRETCHES as f64).max(1.0) }
+    if time < *ALONE { 1.0 } else { time.min(rows.len() as f64 / *STRETCHES as f64).max(1.0) }
 }
 
 /// Poses of rows, numbered in order: repeats share one. Of a moving arm stretches beyond which what is left is forgotten.
 pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f64) -> Vec<usize> {
     if autocorrelation_time > 1.0 {
-        let stretch = ((2.0 * autocorrelation_time).ceil() as usize).min(rows.len() / STRETCHES).max(1);
+        let stretch = ((2.0 * autocorrelation_time).ceil() as usize).min(rows.len() / *STRETCHES).max(1);
         return (0..rows.len()).map(|i| i / stretch).collect();
     }
     let mut measured: Vec<usize> = (0..rows.len()).collect();

@@ -1,20 +1,15 @@
 //! Choices that a search made early are undone: members are exchanged, left out, and put more simply.
 
 use super::{CauseSearch, best, decisive, with};
-use crate::diagnose::pool::EQUIVALENT;
-use crate::effect::{Hypothesis, JointCompliance, JointHardening, JointTable, LinkCompliance};
+use crate::criteria::search::{EQUIVALENT, SINGLE, WIDE};
+use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
-
-/// Sets with more parameters than this are wide.
-const WIDE: usize = 60;
-/// Candidates in place of a single member.
-const SINGLE: usize = 8;
 
 impl CauseSearch<'_, '_> {
     /// Exchanges members, one, two or all of a place at a time, while the criterion falls: greedy choices are undone.
     pub(super) fn exchange(&mut self, mut set: Vec<usize>) -> Vec<usize> {
         // Free curves have dozens of parameters: with several of them a second look costs minutes and changes little.
-        let looks = if self.pool.columns_of(&set).len() > WIDE { 1 } else { 4 };
+        let looks = if self.pool.columns_of(&set).len() > *WIDE { 1 } else { 4 };
         for _ in 0..looks {
             let mut others: BTreeSet<Vec<usize>> = BTreeSet::new();
             let mut gone: BTreeSet<Vec<usize>> = BTreeSet::new();
@@ -30,7 +25,7 @@ impl CauseSearch<'_, '_> {
             for gone in gone {
                 let rest: Vec<usize> = set.iter().copied().filter(|k| !gone.contains(k)).collect();
                 let given = self.pool.given(&rest);
-                let many = if gone.len() == 1 { SINGLE } else { 3 + gone.len() };
+                let many = if gone.len() == 1 { *SINGLE } else { 3 + gone.len() };
                 let candidates = best(self.pool, &given, many).into_iter().filter(|h| !gone.contains(h));
                 let candidates: Vec<Vec<usize>> = candidates.map(|h| with(&rest, h)).collect();
                 // One may stand in for two.
@@ -80,25 +75,22 @@ impl CauseSearch<'_, '_> {
     pub(super) fn simplest(&self, mut set: Vec<usize>) -> Vec<usize> {
         for h in set.clone() {
             let bent = &self.pool.hypotheses[h].form;
-            if !bent.is(&JointHardening) {
-                continue;
-            }
-            let linear = |other: &Hypothesis| other.form.is(&JointCompliance) && other.form.place() == bent.place();
+            let Some(simpler) = bent.cause().simpler() else { continue };
+            let linear = |other: &Hypothesis| other.form.cause().name() == simpler && other.form.place() == bent.place();
             let Some(simple) = self.pool.hypotheses.iter().position(linear).filter(|simple| !set.contains(simple)) else {
                 continue;
             };
             let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
             let other = with(&rest, simple);
-            if self.pool.bic(&other) < self.pool.bic(&set) + EQUIVALENT {
+            if self.pool.bic(&other) < self.pool.bic(&set) + *EQUIVALENT {
                 set = other;
             }
         }
         set
     }
 
-    /// Whether a hypothesis may stand in for two others: a free curve, or the bending of a link for two joints' wind-up.
+    /// Whether a hypothesis may stand in for two others.
     fn stands_in(&self, h: usize) -> bool {
-        let form = &self.pool.hypotheses[h].form;
-        form.cause().is_nameless() || form.is(&JointTable) || form.is(&LinkCompliance)
+        self.pool.hypotheses[h].form.cause().stands_in_for_two()
     }
 }

@@ -10,9 +10,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-/// The gate is closed above this probability that what is left is noise.
-pub(crate) const SIGNIFICANT: f64 = 0.004;
-
 /// Hypotheses that one thread tests, or draws that it projects, at once.
 const CHUNK: usize = 32;
 

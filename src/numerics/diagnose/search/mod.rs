@@ -4,9 +4,8 @@ mod exchange;
 mod gate;
 mod refine;
 
-pub(crate) use gate::SIGNIFICANT;
-
 use super::pool::{CachedHypotheses, Conditional};
+use crate::criteria::search::{DECISIVE, FURTHER, SIGNIFICANT};
 use crate::effect::{Form, Hypothesis, JointCompliance, Survey, follows, is_named_product, products};
 use gate::gate;
 use rayon::prelude::*;
@@ -29,11 +28,6 @@ impl Default for SearchOptions {
         Self { most: 12, beam: 3, draws: 299, seed: 1 }
     }
 }
-
-/// The first cause must lower the criterion by this much: strong evidence (Kass and Raftery, 1995), and the gate judges it too.
-const DECISIVE: f64 = 8.0;
-/// A further one by more: the shape of the first is never quite the true one, and what is left of it imitates others.
-const FURTHER: f64 = 16.0;
 
 /// A pool with the survey by which shapes are refined.
 pub(crate) struct CauseSearch<'a, 'b> {
@@ -77,7 +71,7 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
             let windups = self.all_windups();
             let other = self.climb(windups);
             // With the prior against every further cause, as they were when it climbed.
-            let score = |set: &[usize]| self.pool.bic(set) + FURTHER * set.len() as f64;
+            let score = |set: &[usize]| self.pool.bic(set) + *FURTHER * set.len() as f64;
             if score(&other.set) < score(&found.set) {
                 found = SearchResult { first: found.first, ..other };
             }
@@ -109,7 +103,7 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
             self.multiply(&best);
             last = self.gate(&best);
             first.get_or_insert(last);
-            if last > SIGNIFICANT {
+            if last > *SIGNIFICANT {
                 break;
             }
             let Some(order) = self.step(&beam) else { break };
@@ -201,7 +195,7 @@ fn best(pool: &CachedHypotheses, given: &Conditional, most: usize) -> Vec<usize>
 
 /// What the last of so many causes must lower the criterion by.
 fn decisive(causes: usize) -> f64 {
-    if causes > 1 { FURTHER } else { DECISIVE }
+    if causes > 1 { *FURTHER } else { *DECISIVE }
 }
 
 fn with(set: &[usize], h: usize) -> Vec<usize> {

@@ -1,12 +1,10 @@
 //! Shapes of hypotheses refined: on the grid on which they are proposed the right one may look poor.
 
 use super::{CauseSearch, with};
+use crate::criteria::search::FAMILIES;
 use crate::diagnose::pool::Beside;
 use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
-
-/// Families of shapes that are refined before candidates are compared.
-const FAMILIES: usize = 5;
 
 impl CauseSearch<'_, '_> {
     /// The set with the best form of every effect that has a shape to refine: on a coarse grid the right one may look poor.
@@ -19,7 +17,7 @@ impl CauseSearch<'_, '_> {
             // Bumps, hinges and warm-ups of the unknown are shapes of their own.
             if form.cause().is_nameless() { form.variant() } else { form.name().to_string() }
         };
-        let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
+        let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(*FAMILIES).collect();
         firsts.into_iter().map(|h| with(set, h)).collect()
     }
 

@@ -7,26 +7,11 @@ use super::order::RowOrder;
 use super::pairs::{PointPairs, sampled};
 use super::placement::{Placement, place};
 use super::wrong::WrongSetup;
+use crate::criteria::setup::{ALIKE, BETTER, CLOUD, NOMINAL, OWN_NUMBERS, SAME, SECOND};
 use crate::diagnose::types::Question;
 use crate::robot::RobotModel;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-
-/// A nominal robot leaves less than this share of its reach, and of the size of the measured cloud.
-const NOMINAL: f64 = 0.02;
-/// A robot that is set up rightly leaves less than this share of the measured cloud: joints that hardly move agree with points that
-/// hardly move, however wrong both are.
-const CLOUD: f64 = 0.1;
-/// A set-up error explains where without it so many times less is left.
-const BETTER: f64 = 3.0;
-/// What has numbers of its own must leave so many times less than what has none.
-const OWN_NUMBERS: f64 = 2.0;
-/// Others that leave no more than so many times as much explain as well; of those that are all but the same by kinematics the list's
-/// first counts: a sign is wrong more often than a zero by half a turn.
-const ALIKE: f64 = 1.3;
-const SAME: f64 = 1.02;
-/// Set-up errors that are tried together with another where none explains alone.
-const SECOND: usize = 6;
 
 /// The recording as the files say, and how large arm and measured cloud are.
 pub(super) struct AsStated<'a> {
@@ -74,17 +59,17 @@ impl<'a> AsStated<'a> {
 
     /// Whether no nominal robot leaves so much.
     pub fn is_no_robot(&self) -> bool {
-        self.share_of_reach() > NOMINAL
+        self.share_of_reach() > *NOMINAL
     }
 
     /// Whether the nominal robot leaves more than most, and more than the noise of its points.
     pub fn is_far_off(&self) -> bool {
-        self.is_no_robot() || self.share() > NOMINAL && self.placed.left > self.noise
+        self.is_no_robot() || self.share() > *NOMINAL && self.placed.left > self.noise
     }
 
     /// Whether a part of the rows lies farther off than any nominal robot leaves them, however near most are.
     pub fn is_in_parts(&self) -> bool {
-        is_in_parts(&self.placed.off, NOMINAL * self.reach)
+        is_in_parts(&self.placed.off, *NOMINAL * self.reach)
     }
 
     fn share(&self) -> f64 {
@@ -106,8 +91,8 @@ impl<'a> AsStated<'a> {
         let placed = place(&pairs, number);
         let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
         let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
-        let own = if number.is_some() { OWN_NUMBERS } else { 1.0 };
-        let explains = counts && BETTER * own * share < self.share() && share < CLOUD && placed.left < NOMINAL * pairs.reach();
+        let own = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
+        let explains = counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < *NOMINAL * pairs.reach();
         Try { wrong, placed, share: own * share, explains }
     }
 
@@ -116,7 +101,7 @@ impl<'a> AsStated<'a> {
         let of = |rows: &[usize]| PointPairs::of(self.question.robot, self.question.data, rows.iter().map(|row| (*row, *row)));
         let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
         let found = TwoSetups::of(&of(&sample), &self.placed)?;
-        let is_right = found.left < CLOUD * self.cloud && found.left < NOMINAL * self.reach;
+        let is_right = found.left < *CLOUD * self.cloud && found.left < *NOMINAL * self.reach;
         is_right.then(|| found.of_all(&of(&self.rows), &self.rows))
     }
 
@@ -130,7 +115,7 @@ impl<'a> AsStated<'a> {
             return Some(found);
         }
         one.sort_by(|a, b| a.share.total_cmp(&b.share));
-        let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(SECOND);
+        let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(*SECOND);
         let both = |a: WrongSetup| {
             let others = all.iter().filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
             others.map(move |b| if b.rank() < a.rank() { vec![*b, a] } else { vec![a, *b] })
@@ -145,8 +130,8 @@ impl<'a> AsStated<'a> {
 fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
     let least = explaining.iter().map(|tried| tried.share).fold(f64::INFINITY, f64::min);
-    let best = explaining.iter().find(|tried| tried.share <= SAME * least)?;
-    let is_rival = |tried: &&&Try| tried.wrong != best.wrong && tried.share < ALIKE * least && tried.wrong.len() == 1;
+    let best = explaining.iter().find(|tried| tried.share <= *SAME * least)?;
+    let is_rival = |tried: &&&Try| tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1;
     let alike = explaining.iter().filter(is_rival).map(|tried| tried.wrong[0]).collect();
     Some(ExplainedSetup { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
 }

@@ -5,19 +5,11 @@
 use super::pairs::PointPairs;
 use super::placement::{Placement, place};
 use super::words::mm;
+use crate::criteria::setup::{MIXED_BETTER, MIXED_FAR, MIXED_ROUNDS, MIXED_ROWS, MIXED_SHARE};
 use crate::error::counted;
 use crate::statistics::nearest as quantile;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// Fewer rows than this, or than this share of all, are strays and no set-up.
-const FEWEST: usize = 10;
-const SHARE: f64 = 0.1;
-/// Two placements have twice the numbers of one: they must leave so many times less.
-const BETTER: f64 = 6.0;
-/// Rows farther off than this many medians are not where a placement has them.
-const FAR: f64 = 4.0;
-/// Rounds of dealing.
-const ROUNDS: usize = 12;
 /// Ranges of rows that are listed.
 const LISTED: usize = 4;
 
@@ -35,7 +27,7 @@ impl TwoSetups {
     pub fn of(pairs: &PointPairs, one: &Placement) -> Option<Self> {
         let found = starts(pairs, one).into_iter().filter_map(|start| dealt(pairs, start, most(&one.off)));
         let best = found.min_by(|a, b| a.left.total_cmp(&b.left))?;
-        (BETTER * best.left < best.before).then_some(best)
+        (*MIXED_BETTER * best.left < best.before).then_some(best)
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
@@ -69,12 +61,12 @@ pub(super) fn is_in_parts(off: &[f64], limit: f64) -> bool {
 }
 
 fn fewest(rows: usize) -> usize {
-    FEWEST.max((SHARE * rows as f64) as usize)
+    MIXED_ROWS.max((*MIXED_SHARE * rows as f64) as usize)
 }
 
 /// Nine lengths in ten are no more than this.
 fn most(lengths: &[f64]) -> f64 {
-    quantile(&mut lengths.to_vec(), 1.0 - SHARE).unwrap_or(f64::INFINITY)
+    quantile(&mut lengths.to_vec(), 1.0 - *MIXED_SHARE).unwrap_or(f64::INFINITY)
 }
 
 /// Where rows might part: in stretches, in turn, or by where one placement misses them, in the tracker's frame and the tool's.
@@ -83,7 +75,7 @@ fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
     let mut out: Vec<Vec<bool>> = (1..8).map(|part| (0..rows).map(|row| 8 * row < part * rows).collect()).collect();
     out.push((0..rows).map(|row| row % 2 == 0).collect());
     // The rows that one placement has, and those that it leaves to another.
-    out.push(one.off.iter().map(|off| *off <= FAR * one.left).collect());
+    out.push(one.off.iter().map(|off| *off <= *MIXED_FAR * one.left).collect());
     let [missed, turned] = one.missed(pairs);
     out.extend([missed, turned].iter().map(|all| along_most(all)));
     out
@@ -107,7 +99,7 @@ fn nearest(pairs: &PointPairs, placed: &[Placement; 2]) -> [Vec<usize>; 2] {
 fn dealt(pairs: &PointPairs, first: Vec<bool>, before: f64) -> Option<TwoSetups> {
     let fewest = fewest(pairs.rows());
     let mut rows: [Vec<usize>; 2] = (0..pairs.rows()).partition::<Vec<usize>, _>(|row| first[*row]).into();
-    for _ in 0..ROUNDS {
+    for _ in 0..*MIXED_ROUNDS {
         if rows.iter().any(|own| own.len() < fewest) {
             return None;
         }

@@ -18,10 +18,8 @@ mod wrong;
 
 use super::round::FitState;
 use super::types::{Diagnosis, Question};
+use crate::criteria::setup::FEWEST;
 use compare::AsStated;
-
-/// Fewer rows than this do not tell one error from another: base and tool alone take nine numbers.
-const FEWEST: usize = 10;
 
 /// Rows with whole points: nothing else says where the arm is without its geometry.
 struct WholePoints {
@@ -37,7 +35,7 @@ impl WholePoints {
 
     /// The question of these rows; none where they are too few, or stand beside an outside simulation.
     fn question<'a>(&'a self, question: &Question<'a>) -> Option<Question<'a>> {
-        let asked = self.fit.len() >= FEWEST && !question.beside_simulation;
+        let asked = self.fit.len() >= *FEWEST && !question.beside_simulation;
         asked.then_some(Question { fit: &self.fit, validate: &self.validate, ..*question })
     }
 }

@@ -1,6 +1,7 @@
 //! Orders in which points and joints of two files are joined wrongly: shifted, reversed, or one of them sorted by name as text.
 
 use super::pairs::{PointPairs, median};
+use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
 use nalgebra::Vector3;
 
 /// How the points stand beside the joints.
@@ -19,21 +20,12 @@ pub(super) enum RowOrder {
     },
 }
 
-/// Shifts that are looked at more closely.
-const SHIFTS: usize = 3;
-/// Larger ones are not tried.
-const FARTHEST: usize = 2000;
-/// Steps longer than this many medians count as that: wrong points.
-const LONG: f64 = 4.0;
-/// Below this many rows, names sorted as text are in order.
-const SORTED: usize = 11;
-
 impl RowOrder {
     /// Those that these rows, in their order, may be in.
     pub fn all(pairs: &PointPairs) -> Vec<Self> {
         let mut out = likely_shifts(pairs);
         out.push(Self::Reversed);
-        if pairs.rows() >= SORTED {
+        if pairs.rows() >= *SORTED {
             out.extend([1, 0].into_iter().flat_map(|first| [Self::PointsByText { first }, Self::JointsByText { first }]));
         }
         out
@@ -65,18 +57,18 @@ fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
     let model: Vec<Vector3<f64>> = (0..count).map(|row| robot.forward(pairs.q(row)).translation).collect();
     let (model, measured) = (steps(&model), steps(&pairs.points));
     let likeness = |shift: usize| (0..count).map(|row| model[row] * measured[(row + shift) % count]).sum::<f64>();
-    let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= FARTHEST);
+    let tried = (1..count).filter(|shift| *shift.min(&(count - shift)) <= *FARTHEST);
     let mut all: Vec<(f64, usize)> = tried.map(|shift| (likeness(shift), shift)).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let signed = |shift: usize| if 2 * shift > count { shift as i64 - count as i64 } else { shift as i64 };
-    all.into_iter().take(SHIFTS).map(|(_, shift)| RowOrder::Shifted(signed(shift))).collect()
+    all.into_iter().take(*SHIFTS).map(|(_, shift)| RowOrder::Shifted(signed(shift))).collect()
 }
 
 /// Distances from each point to the next, the first being next to the last, less their mean.
 fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
     let next = points.iter().cycle().skip(1);
     let lengths: Vec<f64> = points.iter().zip(next).map(|(a, b)| (b - a).norm()).collect();
-    let limit = LONG * median(&lengths);
+    let limit = *LONG * median(&lengths);
     let lengths: Vec<f64> = lengths.into_iter().map(|length| length.min(limit)).collect();
     let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
     lengths.into_iter().map(|length| length - mean).collect()

@@ -4,16 +4,12 @@ use super::compare::{AsStated, ExplainedSetup};
 use super::mixture::TwoSetups;
 use super::pairs::median;
 use super::words::{SetupWords, mm, together, words};
+use crate::criteria::setup::{FAR, NAMED};
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
 use crate::diagnose::unasked::{on_its_base, unasked};
 use crate::effect::{ParameterEstimate, Place};
 use crate::estimate::{FitOptions, Screening, fit};
 use crate::observation::Dimension;
-
-/// That it is what it is called: nothing else of the list explains it, or others share it alike.
-const NAMED: f64 = 0.98;
-/// Points farther off than this many medians are wrong by themselves.
-const FAR: f64 = 4.0;
 
 /// A set-up error that explains what the nominal robot leaves.
 pub(super) fn explained(question: &Question, stated: &AsStated, found: &ExplainedSetup) -> Diagnosis {
@@ -39,15 +35,15 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
         text.push_str(&format!(". These data are explained equally well if {}", each.join(", or if ")));
     }
     let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
-    let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();
+    let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= *FAR * median(&found.placed.off)).collect();
     let lengths = |off: &[f64], scale: f64| {
         let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| scale * off).collect();
         ErrorLengths::of_lengths(&kept)
     };
-    let name = NAMED / (1.0 + found.alike.len() as f64);
+    let name = *NAMED / (1.0 + found.alike.len() as f64);
     let finding = Finding {
         parameters: vec![number("median_before", before * 1e3), number("median_after", after * 1e3)],
-        probabilities: Probabilities { name, place: NAMED, none: 1.0 - NAMED },
+        probabilities: Probabilities { name, place: *NAMED, none: 1.0 - *NAMED },
         ..finding(format!("{text}."))
     };
     let errors = (lengths(&stated.placed.off, 1.0), lengths(&found.placed.off, scale));
@@ -90,7 +86,7 @@ fn finding(statement: String) -> Finding {
         parameters: Vec::new(),
         evidence: None,
         rivals: Vec::new(),
-        probabilities: Probabilities { name: NAMED, place: NAMED, none: 1.0 - NAMED },
+        probabilities: Probabilities { name: *NAMED, place: *NAMED, none: 1.0 - *NAMED },
         valid: None,
         forms: Vec::new(),
     }

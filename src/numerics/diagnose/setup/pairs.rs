@@ -1,12 +1,10 @@
 //! Commanded joints beside measured points, as the files say or as they would be with a set-up error mended.
 
+use crate::criteria::setup::MOST;
 use crate::robot::{Measurements, RobotModel, Travel};
 use crate::spatial::Pose;
 use crate::statistics::nearest;
 use nalgebra::Vector3;
-
-/// More rows say no more of errors of this size.
-const MOST: usize = 240;
 
 /// Rows of joints and points.
 #[derive(Clone)]
@@ -23,7 +21,7 @@ pub(super) struct PointPairs<'a> {
 
 /// Some of the rows, evenly over all of them.
 pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
-    rows.iter().copied().step_by(rows.len().div_ceil(MOST).max(1)).collect()
+    rows.iter().copied().step_by(rows.len().div_ceil(*MOST).max(1)).collect()
 }
 
 impl<'a> PointPairs<'a> {

@@ -3,12 +3,11 @@
 
 use super::number::{FreeNumber, SeenNumber};
 use super::pairs::{PointPairs, bodies, median};
+use crate::criteria::setup::TRIM;
 use crate::estimate::align_points;
 use crate::spatial::{Pose, hat};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
-/// Rows farther off than this many medians take no part.
-const TRIM: f64 = 4.0;
 /// Steps: from a tool point that is a third of the arm off it takes seven.
 const STEPS: usize = 20;
 /// A step that brings less than this share ends it.
@@ -116,7 +115,7 @@ impl PlacementProblem<'_, '_> {
         let width = 6 + targets + now.values.len();
         let mut normal = DMatrix::<f64>::zeros(width, width);
         let mut right = DVector::<f64>::zeros(width);
-        let kept: Vec<usize> = (0..now.off.len()).filter(|row| now.off[*row] <= TRIM * now.left).collect();
+        let kept: Vec<usize> = (0..now.off.len()).filter(|row| now.off[*row] <= *TRIM * now.left).collect();
         let centre = kept.iter().map(|row| self.pairs.points[*row]).sum::<Vector3<f64>>() / kept.len().max(1) as f64;
         for row in kept {
             let seen = self.seen(now, row);

@@ -3,6 +3,7 @@
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
+use crate::criteria::setup::{ARMS, SMALL};
 use crate::effect::figure;
 use crate::error::counted;
 use crate::robot::{RobotModel, numbered};
@@ -20,9 +21,6 @@ impl SetupWords {
         Self { what, mend, scale: 1.0 }
     }
 }
-
-/// An arm that reaches less far, or farther, is not what a robot file in the right unit describes, m.
-const ARMS: [f64; 2] = [0.05, 50.0];
 
 /// Of a set-up error; `values` are those of its own number, `reach` is that of the robot file's arm, m.
 pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach: f64) -> SetupWords {
@@ -219,13 +217,10 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
 /// Base axes that matter, mm.
 fn displacement(values: &[f64]) -> String {
     let largest = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-    let axes = values.iter().zip(["x", "y", "z"]).filter(|(value, _)| value.abs() > SMALL * largest);
+    let axes = values.iter().zip(["x", "y", "z"]).filter(|(value, _)| value.abs() > *SMALL * largest);
     let axes: Vec<String> = axes.map(|(value, axis)| format!("{axis} {:+.1} mm", value * 1e3)).collect();
     format!("{} (zero pose, base axes)", axes.join(", "))
 }
-
-/// Of the largest part of a displacement, what is not worth a word.
-const SMALL: f64 = 0.05;
 
 /// A length in mm.
 pub(super) fn mm(metres: f64) -> String {

@@ -1,6 +1,7 @@
 //! Noise that correlation from point to point, as of moving air or a tripod: first-order autoregressive beside white noise, in standard deviations
 //! of each axis. Its innovations (Kalman, 1960) are white, so that causes which change slowly compete against it on equal terms.
 
+use crate::criteria::noise::GROSS;
 /// Noise of which a part is correlated along the rows of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AutocorrelatedNoise {
@@ -13,9 +14,6 @@ pub(crate) struct AutocorrelatedNoise {
 /// Tried values, from short to long.
 const LASTS: [f64; 10] = [0.4, 0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.96, 0.98, 0.99];
 const SHARES: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
-
-/// Residuals of so many standard deviations count as gross: they would hide what the others share.
-const GROSS: f64 = 5.0;
 
 impl AutocorrelatedNoise {
     /// White noise.
@@ -30,7 +28,7 @@ impl AutocorrelatedNoise {
     /// Brings gross residuals back to where they no longer hide what the others share.
     pub fn without_gross(residual: &mut [f64]) {
         let scale = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        residual.iter_mut().for_each(|value| *value = value.clamp(-GROSS * scale, GROSS * scale));
+        residual.iter_mut().for_each(|value| *value = value.clamp(-*GROSS * scale, *GROSS * scale));
     }
 
     /// The share times the autocorrelation time.

@@ -3,6 +3,7 @@
 //! Only parameters of the torque model (payload, link moments, balancers) can explain it. Bias and friction by direction of
 //! approach are each motor's own; a motor whose current does not follow the model at all is not usable.
 
+use crate::criteria::noise::CURRENTS;
 use crate::effect::PointMotion;
 use crate::estimate::Prior;
 use crate::robot::{Measurements, RobotModel};
@@ -23,8 +24,6 @@ pub(crate) struct Currents {
 
 /// A motor follows the model if its torque per modelled torque is within these.
 const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
-/// No current says more than this share of the joint's largest torque: motor constants and friction are no better known.
-const FINEST: f64 = 5e-3;
 
 impl Currents {
     /// Of `rows` seen as `motions`; `None` where no current is usable.
@@ -52,7 +51,7 @@ impl Currents {
             let Some(slope) = slopes.map(|x| x[0]).find(|slope| FOLLOWS.contains(&slope.abs())) else { continue };
             let Some(all) = solve(&features, &held) else { continue };
             let left = DVector::from_vec(held.clone()) - &features * all;
-            let sigma = median_deviation(left.as_slice()).max(FINEST * most);
+            let sigma = median_deviation(left.as_slice()).max(*CURRENTS * most);
             let residual = held.iter().zip(&torque).map(|(held, torque)| held * slope.signum() - torque).collect();
             usable.push((joint, residual, sigma));
         }

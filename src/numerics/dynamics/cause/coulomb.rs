@@ -27,9 +27,13 @@ impl TorqueCause for Coulomb {
         true
     }
 
+    fn is_of_sign(&self) -> bool {
+        true
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
-        fill(out, |row| scene.sign(scene.velocity[joint][row]));
+        fill(out, |row| scene.direction(joint, row));
     }
 
     fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {

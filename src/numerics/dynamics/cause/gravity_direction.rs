@@ -30,6 +30,10 @@ impl TorqueCause for GravityDirection {
         true
     }
 
+    fn is_of_rigid(&self) -> bool {
+        true
+    }
+
     fn write(&self, _form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         out.copy_from_slice(&scene.sideways[column][joint]);
     }

@@ -36,9 +36,13 @@ impl TorqueCause for LoadFriction {
         true
     }
 
+    fn is_of_sign(&self) -> bool {
+        true
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
-        fill(out, |row| scene.sign(scene.velocity[joint][row]) * scene.rigid[joint][row].abs());
+        fill(out, |row| scene.direction(joint, row) * scene.rigid[joint][row].abs());
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {

@@ -21,7 +21,9 @@ mod spring;
 mod stribeck;
 mod torque_constant;
 mod unknown;
+mod unnamed_drag;
 mod unnamed_friction;
+mod unnamed_hysteresis;
 mod viscous;
 mod warmup;
 mod wrist_coupling;
@@ -38,7 +40,7 @@ pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
 
 /// All causes with columns; latency and contacts are looked for before.
-pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 24] = [
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
     &viscous::Viscous,
     &coulomb::Coulomb,
     &offset::Offset,
@@ -63,17 +65,24 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 24] = [
     &gravity_direction::GravityDirection,
     &unknown::Unnamed,
     &unnamed_friction::UnnamedFriction,
+    &unnamed_drag::UnnamedDrag,
+    &unnamed_hysteresis::UnnamedHysteresis,
 ];
 
 /// A shape number that is refined.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShapeSpan {
+    /// As the cause's parameters call it.
+    pub name: &'static str,
+    pub unit: &'static str,
     /// Position in the form's shape.
     pub index: usize,
     pub least: f64,
     pub most: f64,
     /// Refined by ratios instead of differences.
     pub by_ratio: bool,
+    /// What it is unless the data are worth another number.
+    pub usual: Option<f64>,
 }
 
 /// A physical reason why measured torques differ from those of the rigid arm.
@@ -136,6 +145,10 @@ pub(super) trait TorqueCause: Sync {
     }
     /// Whether its columns are made of the rigid torque.
     fn is_of_rigid(&self) -> bool {
+        false
+    }
+    /// Whether its columns are made of the smoothed sign of a velocity.
+    fn is_of_sign(&self) -> bool {
         false
     }
     /// Whether several forms of it may stand at a place.
@@ -215,6 +228,25 @@ impl TorqueForm {
     /// Whether both are the same cause at the same place.
     pub fn is_called_as(&self, other: &Self) -> bool {
         self.cause.name() == other.cause.name() && self.place == other.place
+    }
+
+    /// Shape numbers that are found from the data, each once.
+    pub fn shape_numbers(&self) -> Vec<ShapeSpan> {
+        let mut numbers: Vec<ShapeSpan> = Vec::new();
+        for span in self.cause.spans(self) {
+            let is_found = span.usual != Some(self.shape[span.index]);
+            if is_found && !numbers.iter().any(|known| known.index == span.index) {
+                numbers.push(span);
+            }
+        }
+        numbers
+    }
+
+    /// The same with a shape number moved.
+    pub fn with_shape(&self, index: usize, value: f64) -> Self {
+        let mut moved = self.clone();
+        moved.shape[index] = value;
+        moved
     }
 
     /// What its coefficients are called, one a column, with their units.

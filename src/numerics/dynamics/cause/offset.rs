@@ -1,14 +1,24 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{
+    CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_each_joint_with, fill, plain, shape,
+};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
 pub(in crate::dynamics) const OFFSET: &str = "current_offset";
 
-/// A constant torque that no mass explains: the zero of a current or torque sensor.
+/// A constant torque that no mass explains: the zero of a current or torque sensor. With a shape (s, and the longest that shows) a part of it
+/// comes only as the sensor warms up.
 pub(super) struct Offset;
+
+/// s.
+const TIMES: [f64; 3] = [5.0, USUAL, 45.0];
+/// s, of the form that stands in the rich model.
+const USUAL: f64 = 15.0;
+/// Of the recording: a zero that moves for longer is one that stays.
+const LONGEST: f64 = 0.45;
 
 impl TorqueCause for Offset {
     fn name(&self) -> &'static str {
@@ -16,19 +26,32 @@ impl TorqueCause for Offset {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint(&Offset, scene, 1)
+        let longest = LONGEST * scene.duration();
+        let times: Vec<[f64; 2]> = TIMES.into_iter().filter(|time| *time <= longest).map(|time| [time, longest]).collect();
+        let times: Vec<&[f64]> = times.iter().map(|shape| &shape[..]).collect();
+        let steady = at_each_joint(&Offset, scene, 1);
+        steady.into_iter().chain(at_each_joint_with(&Offset, scene, 2, &times)).collect()
     }
 
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        0.0
+    fn price(&self, form: &TorqueForm) -> f64 {
+        if form.width == 1 { 0.0 } else { 4.0 }
     }
 
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.width == 1 || form.shape[0] == USUAL
     }
 
-    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
-        out.fill(1.0);
+    fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
+        let span =
+            |most: &f64| ShapeSpan { name: "time", unit: "s", index: 0, least: 2.0, most: *most, by_ratio: true, usual: None };
+        form.shape.get(1).map(span).into_iter().collect()
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+        match column {
+            0 => out.fill(1.0),
+            _ => fill(out, |row| (-scene.time[row] / form.shape[0]).exp()),
+        }
     }
 
     fn is_of_angle(&self) -> bool {
@@ -36,14 +59,24 @@ impl TorqueCause for Offset {
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("offset", "Nm")]
+        &[("offset", "Nm"), ("cold", "Nm")]
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("offset", fitted[0], "Nm")]
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+        let mut all = vec![plain("offset", fitted[0], "Nm")];
+        if let (Some(cold), Some(time)) = (fitted.get(1), form.shape.first()) {
+            all.extend([plain("cold", *cold, "Nm"), shape("time", *time, "s")]);
+        }
+        all
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("the torque of {} reads {:.3} Nm too much, whatever it does", form.place, fitted[0].value)
+        let constant = format!("the torque of {} reads {:.3} Nm too much, whatever it does", form.place, fitted[0].value);
+        match fitted.get(1) {
+            None => constant,
+            Some(cold) => {
+                format!("{constant}; it begins {:.3} Nm from that and comes there over {:.1} s", cold.value, form.shape[0])
+            }
+        }
     }
 }

@@ -39,7 +39,11 @@ impl TorqueCause for PreslidingFriction {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 3e-4, most: 0.05, by_ratio: true }]
+        vec![ShapeSpan { name: "travel", unit: "rad", index: 0, least: 3e-4, most: 0.05, by_ratio: true, usual: None }]
+    }
+
+    fn is_of_sign(&self) -> bool {
+        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
@@ -51,7 +55,7 @@ impl TorqueCause for PreslidingFriction {
                 if moved != 0.0 {
                     kept = moved.signum() + (kept - moved.signum()) * (-moved.abs() / travel).exp();
                 }
-                out[row] = kept - scene.sign(velocity[row]);
+                out[row] = kept - scene.direction(form.joint(), row);
             }
         }
     }

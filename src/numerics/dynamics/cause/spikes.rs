@@ -33,7 +33,7 @@ impl TorqueCause for Spikes {
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 0.01, most: 0.3, by_ratio: true }]
+        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 0.01, most: 0.3, by_ratio: true, usual: None }]
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {

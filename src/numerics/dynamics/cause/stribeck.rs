@@ -11,7 +11,10 @@ pub(super) struct Stribeck;
 const USUAL: f64 = 0.1;
 /// Widths of the sign.
 const NARROWEST: f64 = 2.0;
-const SPEEDS: [&[f64]; 5] = [&[0.05], &[0.07], &[USUAL], &[0.15], &[0.25]];
+const SPEEDS: [&[f64]; 8] =
+    [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0], &[0.06, 2.0], &[USUAL, 2.0], &[0.17, 2.0]];
+/// Of speed over its scale: 1 as a rule, found between these (Armstrong-Helouvry, 1991, reports 0.5 to 2).
+const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
 impl TorqueCause for Stribeck {
     fn name(&self) -> &'static str {
@@ -22,13 +25,17 @@ impl TorqueCause for Stribeck {
         at_each_joint_with(&Stribeck, scene, 1, &SPEEDS)
     }
 
+    fn price(&self, form: &TorqueForm) -> f64 {
+        if form.shape.get(1).is_none_or(|exponent| *exponent == 1.0) { 6.0 } else { 10.0 }
+    }
+
     fn modifies(&self) -> &'static [&'static str] {
         &[COULOMB]
     }
 
     /// What falls within the width over which the sign turns is a sign of another width.
     fn is_itself(&self, form: &TorqueForm, scene: &DynamicScene) -> bool {
-        form.shape[0] > NARROWEST * scene.sign_width
+        form.shape[0] > NARROWEST * scene.width_at(form.joint())
     }
 
     fn is_positive(&self) -> bool {
@@ -36,20 +43,27 @@ impl TorqueCause for Stribeck {
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
-        form.shape == [USUAL]
+        form.shape == [USUAL, 1.0]
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 0.02, most: 0.5, by_ratio: true }]
+        let [least, most] = EXPONENTS;
+        let exponent = ShapeSpan { name: "exponent", unit: "1", index: 1, least, most, by_ratio: true, usual: Some(1.0) };
+        let speed = ShapeSpan { name: "speed", unit: "rad/s", index: 0, least: 0.02, most: 0.5, by_ratio: true, usual: None };
+        vec![speed, exponent, speed]
+    }
+
+    fn is_of_sign(&self) -> bool {
+        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
-        fill(out, |row| scene.sign(velocity[row]) * (-velocity[row].abs() / form.shape[0]).exp());
+        fill(out, |row| scene.direction(form.joint(), row) * falls(form, velocity[row]));
     }
 
     fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {
-        Some(sign * (-velocity.abs() / form.shape[0]).exp())
+        Some(sign * falls(form, velocity))
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
@@ -57,11 +71,22 @@ impl TorqueCause for Stribeck {
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("stribeck", fitted[0], "Nm"), shape("speed", form.shape[0], "rad/s")]
+        let all = [plain("stribeck", fitted[0], "Nm"), shape("speed", form.shape[0], "rad/s")];
+        let exponent = form.shape.get(1).filter(|exponent| **exponent != 1.0).map(|exponent| shape("exponent", *exponent, "1"));
+        all.into_iter().chain(exponent).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let [value, speed] = [fitted[0].value, form.shape[0]];
         format!("friction of {} is {value:.3} Nm greater when it begins to move, which falls over {speed:.3} rad/s", form.place)
+    }
+}
+
+/// Of what it is when the joint begins to move.
+fn falls(form: &TorqueForm, velocity: f64) -> f64 {
+    let speeds = velocity.abs() / form.shape[0];
+    match form.shape.get(1) {
+        Some(exponent) if *exponent != 1.0 => (-speeds.powf(*exponent)).exp(),
+        _ => (-speeds).exp(),
     }
 }

@@ -1,11 +1,16 @@
 //! A current that stands for another torque than declared.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, plain};
+use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// A current that stands for another torque than declared.
+/// A current that stands for another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
+/// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) struct TorqueConstant;
+
+/// Of the largest torque.
+const HALVES: [f64; 2] = [0.25, 1.0];
+const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 
 /// Share of the declared one: more is no error of a drive.
 const MOST: f64 = 0.6;
@@ -17,15 +22,28 @@ impl TorqueCause for TorqueConstant {
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         // Beside identified masses it is a part of them.
-        if scene.declared.is_some() { at_each_joint(&TorqueConstant, scene, 1) } else { Vec::new() }
+        let Some(_) = scene.declared else { return Vec::new() };
+        let largest = |joint: usize| scene.rigid[joint].iter().fold(1e-9, |most: f64, torque| most.max(torque.abs()));
+        let falling = |joint: usize| {
+            HALVES.map(|half| TorqueForm::at_joint(&TorqueConstant, joint, 1).shaped(&[half * largest(joint), largest(joint)]))
+        };
+        at_each_joint(&TorqueConstant, scene, 1).into_iter().chain((0..scene.joints()).flat_map(falling)).collect()
     }
 
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        4.0
+    fn price(&self, form: &TorqueForm) -> f64 {
+        if form.shape.is_empty() { 4.0 } else { 10.0 }
     }
 
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.shape.is_empty()
+    }
+
+    fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
+        let span = |largest: &f64| {
+            let [least, most] = HALF_SPAN.map(|share| share * largest);
+            ShapeSpan { name: "half_at", unit: "Nm", index: 0, least, most, by_ratio: true, usual: None }
+        };
+        form.shape.get(1).map(span).into_iter().collect()
     }
 
     fn is_inertial(&self) -> bool {
@@ -42,22 +60,28 @@ impl TorqueCause for TorqueConstant {
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let joint = form.joint();
-        out.copy_from_slice(&scene.rigid[joint]);
+        match form.shape.first() {
+            None => out.copy_from_slice(&scene.rigid[joint]),
+            Some(half) => fill(out, |row| scene.rigid[joint][row] / (1.0 + scene.rigid[joint][row].abs() / half)),
+        }
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
         &[("relative", "1")]
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("relative", fitted[0], "1")]
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+        let half = form.shape.first().map(|half| shape("half_at", *half, "Nm"));
+        [plain("relative", fitted[0], "1")].into_iter().chain(half).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!(
-            "torques of {} read {:+.1} % off: its torque constant is not the declared one",
-            form.place,
-            100.0 * fitted[0].value
-        )
+        let (place, percent) = (form.place, 100.0 * fitted[0].value);
+        match form.shape.first() {
+            None => format!("torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"),
+            Some(half) => format!(
+                "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} Nm: its torque constant is not the declared one"
+            ),
+        }
     }
 }

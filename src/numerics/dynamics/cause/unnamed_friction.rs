@@ -34,13 +34,17 @@ impl TorqueCause for UnnamedFriction {
         true
     }
 
+    fn is_of_sign(&self) -> bool {
+        true
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
         let waves = [1.0, 2.0][column / 2];
         // Faster than any row it stays what it was at the fastest.
         let phase = |row: usize| PI * waves * (velocity[row].abs() / form.shape[0]).min(1.0);
         let wave = |row: usize| if column.is_multiple_of(2) { phase(row).sin() } else { phase(row).cos() };
-        fill(out, |row| scene.sign(velocity[row]) * wave(row));
+        fill(out, |row| scene.direction(form.joint(), row) * wave(row));
     }
 
     fn has_shape(&self, shape: &[f64]) -> bool {

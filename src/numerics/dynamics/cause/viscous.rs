@@ -1,14 +1,17 @@
 //! Friction that grows with the velocity of a joint.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
 pub(in crate::dynamics) const VISCOUS: &str = "viscous_friction";
 
-/// Friction that grows with the velocity of a joint.
+/// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
 pub(super) struct Viscous;
+
+/// Between which the exponent is found.
+const EXPONENTS: [f64; 2] = [0.4, 1.6];
 
 impl TorqueCause for Viscous {
     fn name(&self) -> &'static str {
@@ -16,7 +19,7 @@ impl TorqueCause for Viscous {
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
-        at_each_joint(&Viscous, scene, 1)
+        at_each_joint_with(&Viscous, scene, 1, &[&[1.0]])
     }
 
     fn price(&self, _form: &TorqueForm) -> f64 {
@@ -27,24 +30,49 @@ impl TorqueCause for Viscous {
         true
     }
 
-    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
-        let joint = form.joint();
-        fill(out, |row| scene.velocity[joint][row]);
+    fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
+        let [least, most] = EXPONENTS;
+        let span = ShapeSpan { name: "exponent", unit: "1", index: 0, least, most, by_ratio: true, usual: Some(1.0) };
+        form.shape.first().map(|_| span).into_iter().collect()
     }
 
-    fn friction(&self, _form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
-        Some(velocity)
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        let joint = form.joint();
+        fill(out, |row| power(form, scene.velocity[joint][row]));
+    }
+
+    fn friction(&self, form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
+        Some(power(form, velocity))
     }
 
     fn coefficients(&self) -> &'static [CoefficientName] {
         &[("viscous", "Nm s/rad")]
     }
 
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("viscous", fitted[0], "Nm s/rad")]
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+        let exponent = exponent(form).map(|exponent| shape("exponent", exponent, "1"));
+        [plain("viscous", fitted[0], "Nm s/rad")].into_iter().chain(exponent).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("{} has viscous friction of {:.3} Nm s/rad", form.place, fitted[0].value)
+        let (place, size) = (form.place, fitted[0].value);
+        match exponent(form) {
+            None => format!("{place} has viscous friction of {size:.3} Nm s/rad"),
+            Some(exponent) => {
+                format!(
+                    "{place} has viscous friction of {size:.3} Nm at 1 rad/s, which grows with the power {exponent:.2} of speed"
+                )
+            }
+        }
     }
+}
+
+/// Where it is not 1.
+fn exponent(form: &TorqueForm) -> Option<f64> {
+    form.shape.first().copied().filter(|exponent| *exponent != 1.0)
+}
+
+/// Of a velocity, with its sign.
+fn power(form: &TorqueForm, velocity: f64) -> f64 {
+    exponent(form).map_or(velocity, |exponent| velocity.signum() * velocity.abs().powf(exponent))
 }

@@ -42,7 +42,11 @@ impl TorqueCause for Warmup {
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
-        vec![ShapeSpan { index: 0, least: 1.0, most: form.shape[1], by_ratio: true }]
+        vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 1.0, most: form.shape[1], by_ratio: true, usual: None }]
+    }
+
+    fn is_of_sign(&self) -> bool {
+        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
@@ -50,7 +54,7 @@ impl TorqueCause for Warmup {
         let decay = |row: usize| (-scene.time[row] / form.shape[0]).exp();
         match column {
             0 => fill(out, |row| decay(row) * velocity[row]),
-            _ => fill(out, |row| decay(row) * scene.sign(velocity[row])),
+            _ => fill(out, |row| decay(row) * scene.direction(form.joint(), row)),
         }
     }
 

@@ -64,7 +64,11 @@ impl TorqueCause for WristCoupling {
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
         let [least, most] = if form.shape[0] > 0.0 { [0.05, 2.0] } else { [-2.0, -0.05] };
-        vec![ShapeSpan { index: 0, least, most, by_ratio: false }]
+        vec![ShapeSpan { name: "ratio", unit: "1", index: 0, least, most, by_ratio: false, usual: None }]
+    }
+
+    fn is_of_sign(&self) -> bool {
+        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {

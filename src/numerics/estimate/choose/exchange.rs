@@ -4,6 +4,7 @@
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
 use super::point_jacobian::{PointJacobian, factor, product};
+use crate::criteria::choose::{PASSES, RIDGE, WORTH};
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::estimate::triangle::axpy;
@@ -11,13 +12,6 @@ use crate::robot::Measurements;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, Matrix3};
-
-/// Information in every direction before the first pose, in units of an average candidate's: makes the first steps defined.
-const RIDGE: f64 = 1e-3;
-/// Passes over all chosen poses; later ones gain next to nothing.
-const PASSES: usize = 4;
-/// Gain of log determinant that is worth an exchange.
-const WORTH: f64 = 1e-6;
 
 /// A weighted log determinant.
 pub(super) struct DesignTerm {
@@ -40,7 +34,7 @@ impl DesignTerm {
         let scale = (drawn.rows() as f64).sqrt();
         let inverse = factor(&jacobian.rows(model, drawn)).inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j) * scale);
-        Some(Self { weight, jacobian, round, ridge: RIDGE })
+        Some(Self { weight, jacobian, round, ridge: *RIDGE })
     }
 
     /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
@@ -158,13 +152,13 @@ impl Criterion {
             taken[best] = true;
             chosen.push(best);
         }
-        for _ in 0..PASSES {
+        for _ in 0..*PASSES {
             let mut changed = false;
             for slot in &mut chosen {
                 let old = *slot;
                 states.iter_mut().for_each(|state| state.update(old, -1.0));
                 let stay: f64 = states.iter().map(|state| state.gain(old)).sum();
-                let next = best(&states, &taken).filter(|(_, gain)| *gain > stay + WORTH).map_or(old, |(other, _)| other);
+                let next = best(&states, &taken).filter(|(_, gain)| *gain > stay + *WORTH).map_or(old, |(other, _)| other);
                 if next != old {
                     (taken[old], taken[next]) = (false, true);
                     *slot = next;

@@ -19,6 +19,7 @@ pub use spread::spread;
 pub use t_optimal::{Alternative, Contest, Discrimination, MIN_SEPARATION_L, Proposed, tell};
 
 use super::model::Model;
+use crate::criteria::choose::{RANDOM_SETS, STEPS, WORKSPACE};
 use crate::robot::{Measurements, Named};
 use crate::statistics::nearest;
 use exchange::{Criterion, DesignTerm};
@@ -85,17 +86,11 @@ pub struct Separation {
     pub gain: f64,
 }
 
-/// Random sets to compare with.
-const RANDOM_SETS: usize = 200;
-/// Poses at which the prediction's uncertainty is stated.
-const WORKSPACE: usize = 500;
-/// Rounds of exchange with neighbours, each with smaller steps.
-const STEPS: [f64; 3] = [0.5, 0.2, 0.06];
-
 /// Proposes poses for a model; fails with a sentence when no such poses are possible.
 pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Proposal, String> {
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
-    let workspace = site.draw(&model.robot, WORKSPACE.div_ceil(site.payloads.len()), wish.sigma, wish.seed ^ WORKSPACE as u64)?;
+    let workspace =
+        site.draw(&model.robot, WORKSPACE.div_ceil(site.payloads.len()), wish.sigma, wish.seed ^ *WORKSPACE as u64)?;
     if drawn.rows() < 2 * wish.count {
         return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
     }
@@ -120,7 +115,7 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
     let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
     let mut poses = subset(&drawn, &chosen);
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
-    for step in STEPS {
+    for step in *STEPS {
         let pool = site.around(&model.robot, &poses, step, &mut draw);
         let start: Vec<usize> = (0..wish.count).collect();
         poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
@@ -240,7 +235,7 @@ fn random_sets(drawn: &Measurements, count: usize, seed: u64) -> Vec<Vec<usize>>
         rows.truncate(count);
         rows
     };
-    (0..RANDOM_SETS).map(set).collect()
+    (0..*RANDOM_SETS).map(set).collect()
 }
 
 /// The middle value, NaN of none.

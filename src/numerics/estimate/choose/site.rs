@@ -1,5 +1,6 @@
 //! Where the arm may go: joint ranges, a box and a floor for what is known of the arm, and the payloads at hand.
 
+use crate::criteria::choose::TRIES;
 use crate::robot::{Measurements, Named, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -43,23 +44,21 @@ impl Circumstances {
     }
 }
 
-/// Random poses in a row that may be refused before one gives up.
-const TRIES: usize = 50_000;
-
 impl Site {
     /// `count` even random poses, each once with every payload; fails with a sentence when the region is (nearly) empty.
     pub fn draw(&self, robot: &RobotModel, count: usize, sigma: f64, seed: u64) -> Result<Measurements, String> {
         let mut draw = ChaCha8Rng::seed_from_u64(seed);
         let mut out = Measurements { joints: robot.joints(), ..Measurements::default() };
         for _ in 0..count {
-            let q = (0..TRIES).find_map(|_| {
+            let q = (0..*TRIES).find_map(|_| {
                 let q: Vec<f64> =
                     self.ranges.iter().map(|[lower, upper]| lower + (upper - lower) * draw.random::<f64>()).collect();
                 self.allows(robot, &q).then_some(q)
             });
             let Some(q) = q else {
                 return Err(format!(
-                    "no pose of {TRIES} random ones is inside the box and above the floor: widen the box or limits, or lower the floor"
+                    "no pose of {} random ones is inside the box and above the floor: widen the box or limits, or lower the floor",
+                    *TRIES
                 ));
             };
             self.push(&mut out, robot, &q, sigma);

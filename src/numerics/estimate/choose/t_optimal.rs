@@ -7,7 +7,8 @@
 use super::exchange::{Criterion, DesignTerm};
 use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::{Circumstances, Site};
-use super::{DesignRequest, STEPS, median, random_sets, subset, visit_order};
+use super::{DesignRequest, median, random_sets, subset, visit_order};
+use crate::criteria::choose::STEPS;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
@@ -133,7 +134,7 @@ pub fn tell(
     let terms = terms.ok_or("the recording leaves the parameters undefined")?;
     let criterion = Criterion { terms: terms.into_iter().flatten().collect() };
     let mut poses = subset(&drawn, &criterion.exchange(model, &drawn, &[], wish.count));
-    for step in STEPS {
+    for step in *STEPS {
         let mut pool = site.around(&model.robot, &poses, step, &mut draw);
         circumstances.complete(&mut pool, &mut draw);
         let start: Vec<usize> = (0..wish.count).collect();

@@ -3,6 +3,7 @@
 //! A rigid motion brings the nominal robot's points of a stretch onto the measured ones, but for the errors of a nominal robot;
 //! where it does so only with the joints of rows further on, and all stretches so paired stand under one base, the two logs have slipped.
 
+use crate::criteria::screen::{NOMINAL, SLIPPED_BETTER, STEP, STRETCH, TOGETHER};
 use crate::estimate::align::{align_points, kabsch};
 use crate::robot::Measurements;
 use crate::spatial::Pose;
@@ -11,32 +12,21 @@ use nalgebra::Vector3;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// Rows of a stretch, enough for six numbers and a judgement.
-const STRETCH: usize = 20;
-/// Stretches begin so many rows apart: they overlap, so that few rows beside the place where the logs slip go unseen.
-const STEP: usize = 4;
 /// Most rows that are tried either way.
 const MOST: i64 = 64;
-/// A nominal robot leaves less than this share of the size of a stretch.
-const NOMINAL: f64 = 0.03;
-/// With the right joints so many times less is left.
-const BETTER: f64 = 5.0;
-/// Under the base of the whole recording, where a nominal robot leaves more, so many times less is left of such rows. A base of their own
-/// takes up a step of the pitch of a grid.
-const TOGETHER: f64 = 2.0;
 
 /// For every row how many rows further on its joints are, where that is plain; zero elsewhere.
 pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64> {
     let mut out = vec![0; predicted.len()];
-    for first in (0..predicted.len()).step_by(STEP) {
-        let last = (first + STRETCH).min(predicted.len());
-        let rows = last.saturating_sub(STRETCH)..last;
-        let Some(own) = AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > NOMINAL) else { continue };
+    for first in (0..predicted.len()).step_by(*STEP) {
+        let last = (first + *STRETCH).min(predicted.len());
+        let rows = last.saturating_sub(*STRETCH)..last;
+        let Some(own) = AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > *NOMINAL) else { continue };
         let tried = (1..=MOST).flat_map(|k| [k, -k]);
         let tried = tried.filter_map(|k| AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k)));
         if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
-            && stretch.left < NOMINAL
-            && BETTER * stretch.left < own.left
+            && stretch.left < *NOMINAL
+            && *SLIPPED_BETTER * stretch.left < own.left
         {
             // Rows beside the slip may fit either way, since their joints stand in both places: those are right.
             let nearer = |row: &usize| stretch.nearer(data, predicted, *row, offset);
@@ -56,7 +46,7 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
     }
     let paired = (0..apart.len()).filter_map(|row| Some((*other(predicted, row, apart[row])?, data.point(row)?)));
     let (from, to): (Vec<_>, Vec<_>) = paired.unzip();
-    if from.len() < STRETCH {
+    if from.len() < *STRETCH {
         return;
     }
     let base = align_points(&from, &to);
@@ -68,7 +58,7 @@ fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [
             let mut all: Vec<f64> = run.iter().filter_map(|row| off(*row, offset)).collect();
             nearest(&mut all, 0.5)
         };
-        let better = middle(claimed[run[0]]).zip(middle(0)).is_some_and(|(there, own)| TOGETHER * there < own);
+        let better = middle(claimed[run[0]]).zip(middle(0)).is_some_and(|(there, own)| *TOGETHER * there < own);
         if !better {
             run.iter().for_each(|row| apart[*row] = 0);
         }
@@ -82,10 +72,10 @@ fn beyond_the_log(apart: &mut [i64]) {
         let lost = offset.unsigned_abs() as usize;
         let (past, beside) = if offset > 0 {
             let edge = rows.saturating_sub(lost);
-            (edge..rows, edge.saturating_sub(STEP)..edge)
+            (edge..rows, edge.saturating_sub(*STEP)..edge)
         } else {
             let edge = lost.min(rows);
-            (0..edge, edge..(edge + STEP).min(rows))
+            (0..edge, edge..(edge + *STEP).min(rows))
         };
         if apart[beside].contains(&offset) {
             apart[past].fill(offset);
@@ -105,7 +95,7 @@ impl AlignedStretch {
     fn fit(data: &Measurements, predicted: &[Vector3<f64>], rows: Range<usize>, offset: i64) -> Option<Self> {
         let (from, to): (Vec<_>, Vec<_>) =
             rows.filter_map(|row| Some((*other(predicted, row, offset)?, data.point(row)?))).unzip();
-        if 2 * from.len() < STRETCH {
+        if 2 * from.len() < *STRETCH {
             return None;
         }
         let all: Vec<usize> = (0..from.len()).collect();
@@ -120,7 +110,7 @@ impl AlignedStretch {
     fn nearer(&self, data: &Measurements, predicted: &[Vector3<f64>], row: usize, offset: i64) -> bool {
         data.point(row).zip(other(predicted, row, offset)).is_some_and(|(measured, there)| {
             let off = |point: &Vector3<f64>| (self.motion.point(point) - measured).norm();
-            BETTER * off(there) < off(&predicted[row])
+            *SLIPPED_BETTER * off(there) < off(&predicted[row])
         })
     }
 }

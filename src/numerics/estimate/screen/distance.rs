@@ -3,6 +3,7 @@
 //! Whitened residual e, leverage H = J (J'WJ)^-1 J', Huber weight w: left out, e becomes (1 - wH)^-1 e, of covariance
 //! 1 + H (1 - wH)^-1. Rows that were not fitted have w = 0.
 
+use crate::criteria::screen::SOLE;
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
 use crate::estimate::term::{HUBER, ObservationTerm};
@@ -23,8 +24,6 @@ pub(super) struct LeaveOneOut {
     pub distance: f64,
 }
 
-/// A direction in which a row alone decides more than this cannot be tested: nothing contradicts the row.
-const SOLE: f64 = 0.98;
 /// Rows handled at once.
 const CHUNK: usize = 64;
 
@@ -91,7 +90,7 @@ fn distance(whitened: &Vector3<f64>, leverage: Matrix3<f64>, weight: f64) -> f64
     let squares = (0..3).map(|k| {
         let h = eigen.eigenvalues[k].max(0.0);
         let rest = 1.0 - weight * h;
-        if rest < 1.0 - SOLE { 0.0 } else { along[k] * along[k] / (rest * (rest + h)) }
+        if rest < 1.0 - *SOLE { 0.0 } else { along[k] * along[k] / (rest * (rest + h)) }
     });
     squares.sum::<f64>().sqrt()
 }

@@ -1,6 +1,7 @@
 //! What a row that stands out is: exchanged, mislabelled, shifted, in another unit, a zero, part of an event, or none of these.
 
 use super::distance::LeaveOneOut;
+use crate::criteria::screen::{ALIKE, BETTER, CANDIDATES, LONG_RUN, RUN, SLIP_TOLERANCE, ZERO};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,20 +27,6 @@ pub enum SuspectKind {
 
 /// m, cm, inch and foot for mm, and the other way round.
 const SLIPS: [f64; 10] = [1000.0, 1e-3, 25.4, 1.0 / 25.4, 100.0, 0.01, 10.0, 0.1, 304.8, 1.0 / 304.8];
-/// A slipped point agrees to this share of its distance: far closer than chance, far wider than rounding in the wrong unit.
-const SLIP_TOLERANCE: f64 = 1e-3;
-/// Closer to the origin than this share of the predicted distance is zero.
-const ZERO: f64 = 1e-4;
-/// A point belongs to other joints only if those fit it this many times better than its own.
-const BETTER: f64 = 4.0;
-/// Of all rows whose joints fit a point, so many nearest in the recording are looked at: enough for any number of repeats.
-const CANDIDATES: usize = 64;
-/// Stops in a row that make a shifted block or an event; a stop is a row, or all targets that were measured in one pose.
-const RUN: usize = 3;
-/// A run of this length is no coincidence of outliers even where every tenth row is one.
-const LONG_RUN: usize = 6;
-/// A shorter run is an event only if its rows stand out alike: largest over smallest residual.
-const ALIKE: f64 = 5.0;
 
 /// Names every row in `flagged` (ascending), with its partner. Points are matched within `limit` standard deviations, but not where
 /// the arm moves: there the rows beside one are always near.
@@ -52,7 +39,7 @@ pub(super) fn name(
 ) -> Vec<(usize, SuspectKind, Option<usize>)> {
     let mut kinds: BTreeMap<usize, (SuspectKind, Option<usize>)> = BTreeMap::new();
     for &row in flagged {
-        let misread = data.point(row).and_then(|point| misread(&point, &standings[row].predicted, SLIP_TOLERANCE));
+        let misread = data.point(row).and_then(|point| misread(&point, &standings[row].predicted, *SLIP_TOLERANCE));
         if let Some(kind) = misread {
             kinds.insert(row, (kind, None));
         }
@@ -90,7 +77,7 @@ pub(super) fn misread(measured: &Vector3<f64>, predicted: &Vector3<f64>, toleran
     let slip = SLIPS.iter().find(|factor| (measured / **factor - predicted).norm() < tolerance * distance);
     match slip {
         Some(factor) => Some(SuspectKind::UnitSlip(*factor)),
-        None => (measured.norm() < ZERO * distance).then_some(SuspectKind::Zero),
+        None => (measured.norm() < *ZERO * distance).then_some(SuspectKind::Zero),
     }
 }
 
@@ -112,7 +99,7 @@ impl Index {
         let Some(point) = data.point(row) else { return Vec::new() };
         let own = &standings[row];
         let typical = median_sigma(standings, row);
-        let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / BETTER);
+        let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / *BETTER);
         let start = self.by_x.partition_point(|(x, _)| *x < point.x - reach);
         let slab = self.by_x[start..].iter().take_while(|(x, _)| *x <= point.x + reach);
         let mut found: Vec<(usize, f64)> = slab
@@ -120,7 +107,7 @@ impl Index {
             .filter(|(other, distance)| *other != row && *distance <= reach)
             .collect();
         found.sort_by_key(|(other, _)| (other.abs_diff(row), *other));
-        found.truncate(CANDIDATES);
+        found.truncate(*CANDIDATES);
         found
     }
 }
@@ -174,7 +161,7 @@ fn shift(data: &Measurements, fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: 
             end += 1;
         }
         let (first, last) = (rows[at], rows[end - 1]);
-        if stops(data, &rows[at..end]) >= RUN
+        if stops(data, &rows[at..end]) >= *RUN
             && let Some(offset) = common.into_iter().min_by_key(|offset| (offset.abs(), *offset))
         {
             let to = |row: usize| usize::try_from(row as i64 + offset).ok();
@@ -218,5 +205,5 @@ fn is_event(data: &Measurements, run: &[usize], standings: &[LeaveOneOut]) -> bo
     let sizes = run.iter().map(|row| standings[*row].residual.norm());
     let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| (least.min(size), most.max(size)));
     let stops = stops(data, run);
-    stops >= LONG_RUN || stops >= RUN && most <= ALIKE * least
+    stops >= *LONG_RUN || stops >= *RUN && most <= *ALIKE * least
 }

@@ -14,6 +14,7 @@ pub use kind::SuspectKind;
 use super::fit::{FitOptions, Fitted, fit};
 use super::model::Model;
 use super::problem::Problem;
+use crate::criteria::screen::{BEYOND_CROWD, BULK, CROWD, FAR, GROSS, NOMINAL_TOLERANCE, READMITTING};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
 use distance::{LeaveOneOut, leave_one_out};
@@ -56,22 +57,6 @@ pub struct Screening {
     pub apart: Option<i64>,
 }
 
-/// Beyond this many standard deviations a row is out whatever the tails: Student's t with 3 degrees of freedom gets there
-/// four times in 10,000 rows.
-const GROSS: f64 = 20.0;
-/// The bulk ends at this quantile of the rows that are not gross ...
-const BULK: f64 = 0.98;
-/// ... and far outside begins this many times farther out: with normal noise at 9.4 standard deviations.
-const FAR: f64 = 3.0;
-/// With more than this share of unexplained rows, beyond what chance adds, the model is wrong and not the rows.
-const CROWD: f64 = 0.125;
-/// Among a crowd, only rows this many times the limit away are mistakes all the same.
-const BEYOND_CROWD: f64 = 10.0;
-/// A nominal robot puts its points right to this share of their distance from the tracker; units differ by far more.
-const NOMINAL_TOLERANCE: f64 = 0.05;
-/// Rounds in which a row may come back, since the first fit suffers from what it shall find. Later rows only go: that ends.
-const READMITTING: usize = 3;
-
 /// Fits as [`fit`] does, sets aside what no smooth model can follow among the rows to fit, and fits again until nothing changes.
 ///
 /// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
@@ -83,7 +68,7 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
     let moving = data.in_motion(options.rows);
     let apart = if moving { vec![0; data.rows()] } else { apart::apart(data, &predicted) };
     let plain = |row: &usize| {
-        let misread = data.point(*row).and_then(|point| kind::misread(&point, &predicted[*row], NOMINAL_TOLERANCE));
+        let misread = data.point(*row).and_then(|point| kind::misread(&point, &predicted[*row], *NOMINAL_TOLERANCE));
         apart[*row] == 0 && misread.is_none()
     };
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
@@ -97,7 +82,7 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
     let (mut model, mut fitted) = fit(start, data, &FitOptions { rows: &kept, ..*options });
     let mut aside = BTreeSet::new();
     for round in 0.. {
-        let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
+        let held = if round < *READMITTING { BTreeSet::new() } else { aside.clone() };
         let Screened { suspects, crowd, reach, followed } =
             screen(&model, data, &Rows { asked: options.rows, kept: &kept, set }, &fitted, &held, &slipped);
         // What the fitted model follows never slipped.
@@ -118,7 +103,7 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
         (model, fitted) = fit(start, data, options);
     }
     let kept = options.rows.to_vec();
-    (model, fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: GROSS, apart: throughout })
+    (model, fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: *GROSS, apart: throughout })
 }
 
 /// The offset of more than half of the rows.
@@ -176,7 +161,7 @@ fn screen(
         // A row that judges the model is not set aside by the model alone.
         let judges = asked.binary_search(&row).is_err();
         let uncorroborated = judges && !corroborated::is_wrong(data, row, residual.norm());
-        let among_many = crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row);
+        let among_many = crowded.contains(&set[row]) && *distance < *BEYOND_CROWD * limit && !held.contains(&row);
         if kind == SuspectKind::Outlier && (uncorroborated || among_many) {
             crowd += 1;
         } else {
@@ -212,12 +197,12 @@ fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
 
 /// Where far outside the bulk begins.
 fn limit(bulk: &[f64]) -> f64 {
-    (FAR * nearest(&mut bulk.to_vec(), BULK).unwrap_or(0.0)).min(GROSS)
+    (*FAR * nearest(&mut bulk.to_vec(), *BULK).unwrap_or(0.0)).min(*GROSS)
 }
 
 /// Distances of those of the rows that are not gross.
 fn bulk(standings: &[LeaveOneOut], rows: &[usize]) -> Vec<f64> {
-    rows.iter().map(|row| standings[*row].distance).filter(|distance| *distance <= GROSS).collect()
+    rows.iter().map(|row| standings[*row].distance).filter(|distance| *distance <= *GROSS).collect()
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
@@ -250,7 +235,7 @@ fn crowded(data: &Measurements, named: &[ClassedRow], set: &[usize]) -> BTreeSet
             let all = stops(&(0..set.len()).filter(|row| set[*row] == *number).collect::<Vec<_>>());
             let outlier = |(row, kind, _): &&ClassedRow| set[*row] == *number && *kind == SuspectKind::Outlier;
             let unexplained = stops(&named.iter().filter(outlier).map(|(row, ..)| *row).collect::<Vec<_>>());
-            unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
+            unexplained > *CROWD * all + 2.0 * (*CROWD * (1.0 - *CROWD) * all).sqrt()
         })
         .collect()
 }

@@ -1,11 +1,10 @@
 //! How far out noise reaches: Student's t in three dimensions, fitted to the bulk of the rows (Lange, Little and Taylor, 1989).
 
+use crate::criteria::screen::CHANCE;
 /// Degrees of freedom that are tried; the last is nearly normal.
 const FREEDOMS: [f64; 9] = [2.0, 2.5, 3.0, 4.0, 6.0, 10.0, 20.0, 50.0, 200.0];
 /// Steps of expectation and maximisation: the scale settles long before.
 const STEPS: usize = 30;
-/// By chance so many recordings in one have a row beyond the reach.
-const CHANCE: f64 = 0.005;
 /// Logarithm of a length that nothing exceeds; steps of the tail's integral for every factor of e.
 const OUTSIDE: f64 = 30.0;
 const FINE: f64 = 40.0;
@@ -15,7 +14,7 @@ const FINE: f64 = 40.0;
 pub(super) fn reach(distances: &[f64], rows: usize) -> f64 {
     let fits = FREEDOMS.iter().map(|freedom| Tail::fitted(distances, *freedom));
     let best = fits.max_by(|a, b| a.likelihood.total_cmp(&b.likelihood));
-    best.filter(|_| !distances.is_empty()).map_or(0.0, |tail| tail.quantile(CHANCE / rows.max(1) as f64))
+    best.filter(|_| !distances.is_empty()).map_or(0.0, |tail| tail.quantile(*CHANCE / rows.max(1) as f64))
 }
 
 /// Lengths of vectors that follow Student's t.

@@ -111,6 +111,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             motor_constant: None,
             mass: joint.body.as_ref().map(|body| body.mass),
             centre: joint.body.as_ref().map(|body| body.centre.into()),
+            coulomb: None,
         })
         .collect();
     if let Some(list) = root.get("joints").given() {

@@ -58,6 +58,7 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
             motor_constant: number(&constants, i),
             mass: masses.get(i).and_then(DocumentNode::given).map(DocumentNode::not_negative),
             centre: centres.get(i).and_then(DocumentNode::given).map(|centre| metres(centre).into()),
+            coulomb: None,
         })
         .collect();
     let tool = metres(&root.get("tool"));

@@ -1,7 +1,8 @@
 //! What explains as well as a finding: other causes that fit equally well here, and those that no data could tell from it.
 
 use super::last_round::LastRound;
-use crate::diagnose::pool::EQUIVALENT;
+use crate::criteria::search::EQUIVALENT;
+use crate::criteria::words::FIRM;
 use crate::diagnose::types::RivalCause;
 use crate::effect::{Form, Place};
 
@@ -22,7 +23,7 @@ pub(super) fn rivals(last: &LastRound, rest: &[usize], own: &[usize], bic: f64, 
         set.sort_unstable();
         let delta = pool.bic(&set) - bic;
         // What counts is the fit: the prior's penalties are opinions.
-        if delta - pool.prior_penalty[h] + own_penalty < EQUIVALENT && is_possible(last, &set, h) {
+        if delta - pool.prior_penalty[h] + own_penalty < *EQUIVALENT && is_possible(last, &set, h) {
             out.push(RivalCause { effect, place, delta_bic: delta, probability: 0.0 });
         }
     }
@@ -36,12 +37,9 @@ fn is_possible(last: &LastRound, set: &[usize], h: usize) -> bool {
     let form = &pool.hypotheses[h].form;
     let solution = pool.solve(set);
     let first: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
-    let error = |column: usize| FIRM * solution.error(first + column);
+    let error = |column: usize| *FIRM * solution.error(first + column);
     form.impossible(&own, &error, last.survey).is_none()
 }
-
-/// Standard errors by which a number must be beyond what is possible.
-pub(super) const FIRM: f64 = 2.0;
 
 /// Identities of kinematics and statics, whatever the data.
 pub(super) fn exact(effect: &str, forms: &[Form], rivals: &mut Vec<RivalCause>) {

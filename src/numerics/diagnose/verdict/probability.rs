@@ -4,25 +4,19 @@
 //! proportion to exp(-criterion / 2 T): the criterion is -2 ln of a posterior whose noise is the residual's, so T is 1 for forms that are
 //! right; true shapes differ a little from the library's, which T allows for (`tests/reference/calibrate_probability.py`).
 
+use crate::criteria::words::{FAULT, IDENTITY, TEMPERATURE};
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::types::{Finding, Probabilities, RivalCause};
-use crate::effect::Unknown;
-
-/// T.
-const TEMPERATURE: f64 = 2.03;
-/// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
-const IDENTITY: f64 = 6.3;
-/// Faults of single rows are seen as such or not at all.
-const FAULT: f64 = 0.98;
+use crate::effect::names;
 
 /// Sets the probabilities of a fault of single rows.
 pub(super) fn weigh_fault(fault: &mut Finding) {
-    fault.probabilities = Probabilities { name: FAULT, place: FAULT, none: 1.0 - FAULT };
+    fault.probabilities = Probabilities { name: *FAULT, place: *FAULT, none: 1.0 - *FAULT };
 }
 
 /// Sets the probabilities of a finding and of its rivals; `odds` are those of free forms against names.
 pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds) {
-    if finding.effect == Unknown::NAME {
+    if finding.effect == names::UNKNOWN {
         return weigh_nameless(finding, odds);
     }
     let whole = 1.0 + finding.rivals.iter().map(weight).sum::<f64>();
@@ -34,8 +28,8 @@ pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds) {
 
 /// Of a rival beside a name whose weight is 1; only identities differ by nothing at all.
 fn weight(rival: &RivalCause) -> f64 {
-    let loss = if rival.delta_bic == 0.0 { IDENTITY } else { rival.delta_bic.max(0.0) };
-    (-loss / (2.0 * TEMPERATURE)).exp()
+    let loss = if rival.delta_bic == 0.0 { *IDENTITY } else { rival.delta_bic.max(0.0) };
+    (-loss / (2.0 * *TEMPERATURE)).exp()
 }
 
 /// Of a finding without a name: rivals share what free forms leave.
@@ -83,7 +77,7 @@ mod tests {
         let rivals: Vec<f64> = found.rivals.iter().map(|rival| rival.probability).collect();
         assert!((name + none + rivals.iter().sum::<f64>() - 1.0).abs() < 1e-12 && none == 0.2 && place == 0.9);
         assert!((name - rivals[0]).abs() < 1e-12 && rivals[1] < rivals[0] && rivals[2] < rivals[1]);
-        found.effect = Unknown::NAME;
+        found.effect = names::UNKNOWN;
         weigh(&mut found, &odds);
         let sum: f64 = found.rivals.iter().map(|rival| rival.probability).sum();
         assert!((found.probabilities.name - 0.2).abs() < 1e-12 && (sum - 0.8).abs() < 1e-12);

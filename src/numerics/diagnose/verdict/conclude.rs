@@ -2,28 +2,22 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
-use super::statement::{next, not_observable, not_tried, slower_than_noise};
-use super::unseen::by_speed;
+use super::not_observable::{next, not_observable, not_tried};
+use super::unseen::unseen;
+use crate::criteria::judge::FOLDS;
+use crate::criteria::noise::{LOUD, REPEATS, TOO_LOUD};
+use crate::criteria::search::SIGNIFICANT;
+use crate::criteria::words::{NAMELESS, NOT_NOISE, REST, WEAK};
 use crate::diagnose::closed_form::FormulaSearch;
-use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
-use crate::diagnose::misfit::{LOUD, Misfit, TOO_LOUD};
-use crate::diagnose::round::{Fitter, REPEATS};
-use crate::diagnose::search::SIGNIFICANT;
+use crate::diagnose::misfit::Misfit;
+use crate::diagnose::round::Fitter;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::diagnose::verdict_statement::{Ground, statement};
-use crate::effect::Unknown;
+use crate::diagnose::words::{Ground, slower_than_noise, statement};
+use crate::effect::names;
 use crate::estimate::{Model, cross_validate};
 use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
-
-/// Without repeats a residual is not called noise where it is this many times the instrument's.
-const NOT_NOISE: f64 = 4.0;
-
-/// A weak unnamed finding of less than this share of the strongest one's gain is its rest.
-const REST: f64 = 0.03;
-/// A criterion that is worse by more than this without it makes it a finding all the same.
-const WEAK: f64 = 60.0;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
 pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
@@ -35,11 +29,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let basis = basis(fitter);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
-    let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= SIGNIFICANT);
-    let structured = last.last <= SIGNIFICANT || lacking;
-    let something_left = structured && misfit.chi_square > LOUD || misfit.chi_square > TOO_LOUD || misfit.not_carried.is_some();
+    let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
+    let structured = last.last <= *SIGNIFICANT || lacking;
+    let something_left = structured && misfit.chi_square > *LOUD || misfit.chi_square > *TOO_LOUD || misfit.not_carried.is_some();
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
-    let above_stated = is_stated && misfit.beyond_stated > LOUD;
+    let above_stated = is_stated && misfit.beyond_stated > *LOUD;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
         // What lasts from point to point may be the air, and may be a cause that follows time.
         VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => VerdictKind::Unexplained,
@@ -48,11 +42,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         other => other,
     };
     let nameless = !something_left && only_unknown(&findings);
-    let partly_nameless = !something_left && !nameless && nameless_share(&findings) > NAMELESS;
+    let partly_nameless = !something_left && !nameless && nameless_share(&findings) > *NAMELESS;
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
-    not_observable.extend(by_speed(&last));
+    not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
@@ -60,7 +54,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let state = last.judged.state;
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
-    let folds = if lengths { cross_validate(&state.session(fitter), FOLDS, fitter.question.seed) } else { None };
+    let folds = if lengths { cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed) } else { None };
     let ground = Ground { partly_nameless, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
     Diagnosis {
         dimension: misfit.dimension,
@@ -108,7 +102,7 @@ fn within(mut findings: Vec<Finding>, model: &Model) -> Vec<Finding> {
 fn basis(fitter: &Fitter) -> NoiseBasis {
     let JointRepeatability { sigma, repeats } = fitter.repeatability;
     match fitter.data.noise_basis {
-        _ if repeats >= REPEATS => NoiseBasis::Repeats,
+        _ if repeats >= *REPEATS => NoiseBasis::Repeats,
         _ if sigma > 0.0 => NoiseBasis::Inferred,
         stated => stated,
     }
@@ -118,13 +112,10 @@ fn basis(fitter: &Fitter) -> NoiseBasis {
 fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
     let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
     let small = |finding: &Finding| {
-        finding.has_no_law() && finding.evidence.is_some_and(|e| e.gain < REST * strongest && e.delta_bic < WEAK)
+        finding.has_no_law() && finding.evidence.is_some_and(|e| e.gain < *REST * strongest && e.delta_bic < *WEAK)
     };
     findings.into_iter().partition(small)
 }
-
-/// What has no name explains nothing where it is more than this share of what was found.
-const NAMELESS: f64 = 0.1;
 
 /// The share, in what all findings gain, of those without a name or with one that is more probably wrong.
 fn nameless_share(findings: &[Finding]) -> f64 {
@@ -136,19 +127,19 @@ fn nameless_share(findings: &[Finding]) -> f64 {
             .map(|e| e.gain)
             .sum()
     };
-    let unnamed = |finding: &Finding| finding.effect == Unknown::NAME || finding.probabilities.none > 0.5;
+    let unnamed = |finding: &Finding| finding.effect == names::UNKNOWN || finding.probabilities.none > 0.5;
     gains(&unnamed) / gains(&|_| true).max(f64::MIN_POSITIVE)
 }
 
 /// Whether something was found, and none of it has a name.
 fn only_unknown(findings: &[Finding]) -> bool {
     let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
-    physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME)
+    physics.peek().is_some() && physics.all(|finding| finding.effect == names::UNKNOWN)
 }
 
 fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
-    let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
-    if blind || something_left || nameless_share(findings) > NAMELESS {
+    let blind = repeatability.repeats < *REPEATS && misfit.noise_floor > *NOT_NOISE * misfit.instrument;
+    if blind || something_left || nameless_share(findings) > *NAMELESS {
         VerdictKind::Unexplained
     } else if findings.is_empty() {
         VerdictKind::NothingMissing

@@ -1,0 +1,77 @@
+//! Numbers by which something is decided, one table a class: what each means, its unit, where it is from, and what halving and doubling
+//! it does.
+//!
+//! A source is of one of these kinds: `literature`, `physics` (sizes of arms, links, air), `count` (what follows from how many there
+//! are), `measured by` a script, and `judgement`: somebody chose it. The last entry of a row is what `tests/reference/ablate.py` saw; it is
+//! empty where no recording of that run came by. Numbers that decide nothing (rows that one thread handles, roundings, steps of a solver)
+//! stand where they are used.
+//!
+//! With the feature `ablate` a program may scale each of them while it runs; without it they are constants.
+
+mod criterion;
+#[cfg(feature = "ablate")]
+mod scaled;
+mod table;
+
+pub mod choose;
+pub mod closed_form;
+pub mod effect;
+pub mod judge;
+pub mod noise;
+pub mod open_world;
+pub mod screen;
+pub mod search;
+pub mod setup;
+pub mod words;
+
+pub use criterion::CriterionValue;
+#[cfg(feature = "ablate")]
+pub use scaled::{CriterionFactor, Scaled};
+pub use table::CriterionRow;
+
+/// All tables.
+pub const TABLES: &[&[CriterionRow]] = &[
+    choose::ROWS,
+    closed_form::ROWS,
+    effect::ROWS,
+    judge::ROWS,
+    noise::ROWS,
+    open_world::ROWS,
+    screen::ROWS,
+    search::ROWS,
+    setup::ROWS,
+    words::ROWS,
+];
+
+/// Whether something came by a criterion since the last call, by the names of rooms and criteria.
+#[cfg(feature = "ablate")]
+pub fn reached() -> Vec<String> {
+    all().filter(|(_, criterion)| criterion.was_reached()).map(|(name, _)| name.to_string()).collect()
+}
+
+/// Scales one criterion (`room::NAME`) and leaves all others as they are; `false` where there is none of that name.
+#[cfg(feature = "ablate")]
+pub fn scale(name: &str, factor: CriterionFactor) -> bool {
+    all().for_each(|(_, criterion)| criterion.scale(CriterionFactor::One));
+    all().find(|(own, _)| *own == name).is_some_and(|(_, criterion)| {
+        criterion.scale(factor);
+        true
+    })
+}
+
+#[cfg(feature = "ablate")]
+fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable)> {
+    let rooms = [
+        choose::SCALABLE,
+        closed_form::SCALABLE,
+        effect::SCALABLE,
+        judge::SCALABLE,
+        noise::SCALABLE,
+        open_world::SCALABLE,
+        screen::SCALABLE,
+        search::SCALABLE,
+        setup::SCALABLE,
+        words::SCALABLE,
+    ];
+    rooms.into_iter().flatten().copied()
+}

@@ -1,0 +1,57 @@
+//! What is noise: repeats, stated sigma, autocorrelation, sizes that causes share.
+
+use super::CriterionValue;
+use super::table::criteria;
+
+criteria! {
+    "noise";
+    /// A residual this much larger than the noise, in mean square, does not agree with it: where it has structure it is not
+    /// explained ...
+    LOUD: f64 = 1.25, "ratio of squares", "judgement: more than a stated sigma is off by", "";
+    /// ... and this much larger it is not whatever it looks like.
+    TOO_LOUD: f64 = 2.5, "ratio of squares", "judgement: no stated sigma is off by 60 %", "";
+    /// Repeats that make the noise known; with fewer it is taken from a residual without structure.
+    REPEATS: usize = 10, "repeats", "count: a standard deviation known to a quarter", "";
+    /// Fewer repeats than this say too little.
+    FEW: usize = 4, "repeats", "count: a standard deviation known to a third", "";
+    /// A squared whitened error counts at most this much.
+    CAP: f64 = 30.0, "squared standard deviations", "count: five and a half, beyond any normal row", "";
+    /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
+    SEARCHED: usize = 800, "rows", "judgement: bounds time", "";
+    /// Rows that count as fewer than this are independent.
+    ALONE: f64 = 1.2, "rows", "judgement: a sixth of correlation is none", "";
+    /// With fewer stretches than this signs by stretch say nothing.
+    STRETCHES: usize = 40, "stretches", "count: a bootstrap by signs needs tens of units", "";
+    /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
+    PLAIN: f64 = 20.0, "-2 ln of odds", "literature: strong evidence, doubled, Kass and Raftery (1995)", "";
+    /// Causes that follow time must be better than correlated noise by strong evidence: such noise is everywhere.
+    CLEARER: f64 = 8.0, "-2 ln of odds", "literature: strong evidence, Kass and Raftery (1995)", "";
+    /// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree
+    /// of freedom): too short a noise makes causes of noise.
+    AS_GOOD: f64 = 3.84, "-2 ln of likelihood", "literature: 95 % of chi-square, one degree of freedom", "";
+    /// Sizes are asked anew after each fit with priors, so often at most.
+    FITS: usize = 2, "fits", "judgement: bounds time", "";
+    /// Twice the logarithm of the evidence, below the greatest, at which a size is spoken against.
+    AGAINST: f64 = 6.0, "-2 ln of evidence", "literature: positive evidence, Kass and Raftery (1995)", "";
+    /// A combination this many times (squared) its standard error is shown by the rows.
+    SHOWN: f64 = 9.0, "squared standard errors", "literature: three sigma", "";
+    /// A coefficient is hardly ever smaller than this share of the largest that is not of the family: the arm's own lines bend
+    /// a little.
+    BESIDE: f64 = 0.2, "share", "judgement: lines of an arm", "";
+    /// Cosines of a curve that are all but geometry, which alone carries on beyond the range, and are held down.
+    SLOW: usize = 3, "cosines", "count: less than two periods", "";
+    /// The share to which they are held down.
+    GEOMETRY: f64 = 0.2, "share", "judgement: a fifth of a curve may be slow", "";
+    /// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
+    ESTIMATES: usize = 3, "estimates", "judgement: bounds time", "";
+    /// A repeatability that changes by less than this share is settled.
+    SETTLED: f64 = 0.25, "share", "judgement: weights hardly change by less", "";
+    /// Most rounds of search and refit; it settles in two or three.
+    ROUNDS: usize = 6, "rounds", "judgement: bounds time", "";
+    /// Rows follow a path where the middle step from row to row is below this share of the middle distance of any two poses.
+    NEAR: f64 = 0.35, "share", "judgement: paths have a hundredth, poses at random one", "";
+    /// Residuals of so many standard deviations count as gross: they would hide what the others share.
+    GROSS: f64 = 5.0, "standard deviations", "literature: one normal value in two million", "";
+    /// No current says more than this share of the joint's largest torque: motor constants and friction are no better known.
+    CURRENTS: f64 = 5e-3, "share of the largest torque", "judgement: motor constants and friction", "";
+}

@@ -1,0 +1,64 @@
+//! Set-up errors: what is wrong between files and robot file before any physics.
+
+use super::CriterionValue;
+use super::table::criteria;
+
+criteria! {
+    "setup";
+    /// A nominal robot leaves less than this share of its reach, and of the size of the measured cloud.
+    NOMINAL: f64 = 0.02, "share", "physics: nominal robots err by millimetres in metres", "";
+    /// A robot that is set up rightly leaves less than this share of the measured cloud: joints that hardly move agree with
+    /// points that hardly move, however wrong both are.
+    CLOUD: f64 = 0.1, "share", "judgement: a tenth", "";
+    /// A set-up error explains where without it so many times less is left.
+    BETTER: f64 = 3.0, "ratio", "judgement: half an order of magnitude", "";
+    /// What has numbers of its own must leave so many times less than what has none.
+    OWN_NUMBERS: f64 = 2.0, "ratio", "judgement: one number explains less than that", "";
+    /// Others that leave no more than so many times as much explain as well.
+    ALIKE: f64 = 1.3, "ratio", "judgement: noise of small recordings", "";
+    /// Of those that leave no more than so many times as much, and are all but the same by kinematics, the list's first counts:
+    /// a sign is wrong more often than a zero by half a turn.
+    SAME: f64 = 1.02, "ratio", "judgement: rounding of fits", "";
+    /// Set-up errors that are tried together with another where none explains alone.
+    SECOND: usize = 6, "errors", "judgement: bounds time", "";
+    /// What no arm's length is off by when it is made, as a share of itself.
+    LENGTH: f64 = 0.02, "share", "physics: links are made to a tenth of a percent", "";
+    /// The same of a short length, as a share of the reach.
+    SHORT: f64 = 0.005, "share of the reach", "physics: castings and flanges", "";
+    /// The same of a gear's ratio.
+    RATIO: f64 = 0.01, "share", "physics: teeth are counted", "";
+    /// Standard deviations by which a number must be beyond.
+    CLEARLY: f64 = 5.0, "standard deviations", "judgement: models that are wrong elsewhere", "";
+    /// Fewer rows than this are strays and no set-up.
+    MIXED_ROWS: usize = 10, "rows", "count: six numbers of a placement", "";
+    /// A smaller share of all rows than this are strays and no set-up.
+    MIXED_SHARE: f64 = 0.1, "share", "judgement: a tenth", "";
+    /// Two placements have twice the numbers of one: they must leave so many times less.
+    MIXED_BETTER: f64 = 6.0, "ratio", "judgement: twice that of one placement", "";
+    /// Rows farther off than this many medians are not where a placement has them.
+    MIXED_FAR: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
+    /// Rounds of dealing.
+    MIXED_ROUNDS: usize = 12, "rounds", "judgement: it settles in three", "";
+    /// Fewer rows than this do not tell one error from another: base and tool alone take nine numbers.
+    FEWEST: usize = 10, "rows", "count: nine numbers of base and tool", "";
+    /// Shifts that are looked at more closely.
+    SHIFTS: usize = 3, "shifts", "judgement: bounds time", "";
+    /// Larger ones are not tried.
+    FARTHEST: usize = 2000, "rows", "judgement: bounds time", "";
+    /// Steps longer than this many medians count as that: wrong points.
+    LONG: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
+    /// Below this many rows, names sorted as text are in order.
+    SORTED: usize = 11, "rows", "count: names below 10 sort alike", "";
+    /// That it is what it is called: nothing else of the list explains it, or others share it alike.
+    NAMED: f64 = 0.98, "probability", "count: set-up errors put in and named, tests/reference/setups.py", "";
+    /// Points farther off than this many medians are wrong by themselves.
+    FAR: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
+    /// More rows say no more of errors of this size.
+    MOST: usize = 240, "rows", "judgement: bounds time", "";
+    /// Rows farther off than this many medians take no part.
+    TRIM: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
+    /// Arms that reach less far, or farther, are not what a robot file in the right unit describes.
+    ARMS: [f64; 2] = [0.05, 50.0], "m", "physics: smallest and largest arms", "";
+    /// Of the largest part of a displacement, what is not worth a word.
+    SMALL: f64 = 0.05, "share", "judgement: a twentieth", "";
+}

@@ -1,0 +1,106 @@
+//! By how much friction turns before the velocity does: friction that a simulator lets a solver find turns with velocity and
+//! acceleration, and velocities that a drive smooths lag behind the friction that it feels.
+
+use super::problem::TorqueProblem;
+use super::sign_width::{FrictionFit, own_sign_widths, sign_width};
+
+/// s: most on either side, and the first step.
+const MOST: f64 = 0.024;
+const STEP: f64 = 0.004;
+/// s: steps about the best of the grid.
+const STEPS: [f64; 4] = [0.002, 0.001, 0.0005, 0.00025];
+/// Steps of STEP on either side by which lead and latency are moved together: friction alone tells only their difference.
+const TOGETHER: i32 = 4;
+/// s: less is none; two that differ by less are one.
+const LEAST: f64 = 0.001;
+const SAME: f64 = 2e-4;
+/// Fall of rows times the logarithm of the mean square, over all joints; residuals last over some rows.
+const GAIN: f64 = 200.0;
+/// The same of one joint, to agree.
+const OWN_GAIN: f64 = 10.0;
+/// Of the joints that must agree.
+const AGREEING: f64 = 0.6;
+
+/// Takes the lead that most joints agree on, 0 where they do not, with the width of the sign beside it; tells whether it is another than
+/// before.
+pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
+    let (before, latency) = (problem.scene.friction_lead, problem.latency);
+    let mut fit = FrictionFit::new(problem);
+    let mut left_by = |problem: &mut TorqueProblem, lead: f64, moved: f64| {
+        problem.scene.friction_lead = lead;
+        fit.take(&problem.difference(latency + moved));
+        fit.left(problem)
+    };
+    let unmoved = left_by(problem, 0.0, 0.0);
+    let mut best = (unmoved.iter().sum::<f64>(), 0.0, 0.0);
+    let mut try_lead = |lead: f64, moved: f64, best: &mut (f64, f64, f64)| {
+        let left = left_by(problem, lead, moved).iter().sum::<f64>();
+        if left < best.0 {
+            *best = (left, lead, moved);
+        }
+    };
+    let steps = (MOST / STEP).round() as i32;
+    (-steps..=steps).filter(|step| *step != 0).for_each(|step| try_lead(STEP * f64::from(step), 0.0, &mut best));
+    let about = best.1;
+    for step in (-TOGETHER..=TOGETHER).filter(|step| *step != 0).map(|step| STEP * f64::from(step)) {
+        try_lead(about + step, step, &mut best);
+    }
+    for step in STEPS {
+        let (_, about, moved) = best;
+        [about - step, about + step].iter().for_each(|lead| try_lead(*lead, moved, &mut best));
+    }
+    let left = left_by(problem, best.1, best.2);
+    let rows = fit.rows() as f64;
+    let gains: Vec<f64> = unmoved.iter().zip(&left).map(|(unmoved, left)| rows * (unmoved - left)).collect();
+    let agreeing = gains.iter().filter(|gain| **gain > OWN_GAIN).count();
+    let needed = ((AGREEING * gains.len() as f64).ceil() as usize).max(2);
+    let is_one = best.1.abs() > LEAST && gains.iter().sum::<f64>() > GAIN && agreeing >= needed;
+    let found = if is_one { best.1 } else { 0.0 };
+    let is_new = (found - before).abs() > SAME;
+    problem.scene.friction_lead = if is_new { found } else { before };
+    if is_new {
+        let width = sign_width(problem);
+        problem.scene.turn_over(width);
+        if is_one {
+            // A solver lets friction turn over an acceleration: the lighter a joint, the wider.
+            let own = own_sign_widths(problem);
+            problem.scene.turn_each_over(own);
+        }
+    }
+    is_new
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::{arm, record};
+    use super::super::{TorqueQuestion, diagnose};
+
+    /// s.
+    const LEAD: f64 = 0.0095;
+
+    /// Lead (s) that is found of friction that turns as a solver lets it, over a width (rad/s) of each joint; findings beside plain friction.
+    fn found(latency: f64) -> (f64, Vec<String>) {
+        let widths = [0.001, 0.002, 0.006, 0.03];
+        let soft = |(joint, _, _, velocity, acceleration, _): (usize, f64, f64, f64, f64, f64)| {
+            3.0 * velocity + 8.0 * ((velocity + LEAD * acceleration) / widths[joint]).clamp(-1.0, 1.0)
+        };
+        let diagnosis = diagnose(&arm(), &record(&arm(), latency, &soft), &TorqueQuestion::default(), &mut |_| ()).unwrap();
+        let others =
+            diagnosis.findings.iter().filter(|finding| !["viscous_friction", "coulomb_friction"].contains(&finding.effect));
+        let others = others.map(|finding| finding.statement.clone());
+        (diagnosis.model.friction_lead, others.collect())
+    }
+
+    #[test]
+    fn friction_that_turns_before_the_velocity_is_plain_friction_with_its_lead() {
+        let (lead, others) = found(0.0);
+        assert!((lead - LEAD).abs() < 0.001 && others.is_empty(), "{lead}: {others:?}");
+    }
+
+    #[test]
+    fn torques_that_come_late_are_told_from_friction_that_turns_early() {
+        let (lead, others) = found(0.014);
+        assert!((lead - LEAD).abs() < 0.0015, "{lead}: {others:?}");
+        assert!(others.len() == 1 && others[0].starts_with("torques come 1"), "{others:?}");
+    }
+}

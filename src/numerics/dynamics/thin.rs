@@ -1,0 +1,231 @@
+//! A long recording in memory that does not grow with it: block by block through a low-pass, of which every so manieth row is kept.
+//!
+//! A course that is filtered before its rows are thinned keeps what is slow. Blocks overlap by what the filter remembers, so that it does not
+//! matter where they end.
+
+use super::bridge::Bridged;
+use super::clock::{ClockPace, RecordingClock};
+use super::filter::ZeroPhase;
+use super::recording::TorqueRecording;
+use super::scene::column;
+use super::source::TorqueSource;
+use super::survey::RecordingSurvey;
+use crate::error::Result;
+use std::ops::Range;
+
+/// The rate of kept rows over the cut-off, at least: far from both, friction that turns with the direction is still sampled well.
+const RATE_OVER_CUTOFF: f64 = 10.0;
+/// The low-pass before thinning, as a share of the rate of kept rows.
+const BAND: f64 = 0.4;
+/// Of the low-pass: rows that it remembers, as a share of rate over cut-off.
+const MEMORY: f64 = 20.0;
+/// Rows of a span: a recording that is still too long keeps some spans and leaves out others, evenly.
+const SPAN: usize = 1 << 15;
+/// Rows before and after a gap that say what was lost in it.
+const CONTEXT: usize = 4;
+
+/// Which rows of a long recording are kept.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ThinningPlan {
+    /// Of so many rows one.
+    pub every: usize,
+    /// Spans of the recording, and how many of them are kept.
+    pub spans: [usize; 2],
+}
+
+impl ThinningPlan {
+    /// For at most `most` rows (and some more where rows were lost), with a cut-off that will be at `cutoff` Hz.
+    pub fn new(rows: usize, rate: f64, cutoff: f64, most: usize) -> Self {
+        let every = rows.div_ceil(most).min((rate / (RATE_OVER_CUTOFF * cutoff)) as usize).max(1);
+        let all = rows.div_ceil(SPAN);
+        let kept = if rows.div_ceil(every) > most { (most * every / SPAN).clamp(1, all) } else { all };
+        Self { every, spans: [all, kept] }
+    }
+
+    /// Whether a recorded row lies in a span that is kept.
+    fn keeps(&self, row: usize) -> bool {
+        let [all, kept] = self.spans;
+        let before = |span: usize| span * kept / all;
+        before(row / SPAN + 1) > before(row / SPAN)
+    }
+}
+
+/// A recording that was thinned.
+pub(super) struct ThinnedRecording {
+    pub recording: TorqueRecording,
+    pub clock: RecordingClock,
+    /// Of each row: the recorded one.
+    pub origin: Vec<usize>,
+    /// Rows that were made up where some were lost.
+    pub made_up: usize,
+    /// Recorded rows before which clock or joints jump, and s since the row before.
+    pub tears: Vec<(usize, f64)>,
+}
+
+impl ThinnedRecording {
+    /// Reads all rows once more.
+    pub fn of(source: &dyn TorqueSource, survey: &RecordingSurvey, plan: &ThinningPlan) -> Result<Self> {
+        let mut thinner: Option<Thinner> = None;
+        source.blocks(&mut |block| {
+            thinner.get_or_insert_with(|| Thinner::new(block, survey.pace.clone(), plan.clone())).push(block);
+            Ok(())
+        })?;
+        let mut thinner = thinner.unwrap_or_else(|| {
+            let nothing = TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new());
+            Thinner::new(&nothing, survey.pace.clone(), plan.clone())
+        });
+        thinner.pass_on(0);
+        thinner.end_stretch();
+        let rate = 1.0 / (survey.pace.usual * plan.every as f64);
+        Ok(Self {
+            clock: RecordingClock { rate, stretches: thinner.stretches },
+            recording: thinner.kept,
+            origin: thinner.origin,
+            made_up: thinner.made_up,
+            tears: thinner.tears,
+        })
+    }
+}
+
+struct Thinner {
+    plan: ThinningPlan,
+    pace: ClockPace,
+    filter: ZeroPhase,
+    /// Rows beyond which the filter does not feel what is beside.
+    margin: usize,
+    /// The last rows as they were recorded, of which the first `passed` have gone on.
+    recorded: TorqueRecording,
+    passed: usize,
+    /// Recorded row of the first of these.
+    first: usize,
+    /// The present stretch: rows without gaps, of which those before `begun` are already gone; with their origins.
+    stretch: TorqueRecording,
+    origins: Vec<usize>,
+    begun: usize,
+    /// Of the stretch: the next row to keep.
+    next: usize,
+    kept: TorqueRecording,
+    origin: Vec<usize>,
+    stretches: Vec<Range<usize>>,
+    made_up: usize,
+    tears: Vec<(usize, f64)>,
+}
+
+impl Thinner {
+    fn new(like: &TorqueRecording, pace: ClockPace, plan: ThinningPlan) -> Self {
+        let rate = 1.0 / pace.usual;
+        let band = BAND * rate / plan.every as f64;
+        let filter = if plan.every > 1 { ZeroPhase::new(rate, band) } else { ZeroPhase::new(rate, rate) };
+        let nothing = || TorqueRecording::like(like);
+        Self {
+            margin: if plan.every > 1 { (MEMORY * rate / band) as usize } else { 0 },
+            filter,
+            plan,
+            pace,
+            recorded: nothing(),
+            passed: 0,
+            first: 0,
+            stretch: nothing(),
+            origins: Vec::new(),
+            begun: 0,
+            next: 0,
+            kept: nothing(),
+            origin: Vec::new(),
+            stretches: Vec::new(),
+            made_up: 0,
+            tears: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, block: &TorqueRecording) {
+        self.recorded.extend(block, 0..block.rows());
+        self.pass_on(CONTEXT);
+        self.keep(false);
+    }
+
+    /// Passes recorded rows on to the stretch, but the last `waiting` ones, with those that were lost between them.
+    fn pass_on(&mut self, waiting: usize) {
+        let end = self.recorded.rows().saturating_sub(waiting).max(self.passed);
+        let like = TorqueRecording::like(&self.recorded);
+        let bridged = Bridged::by_steps(std::mem::replace(&mut self.recorded, like), self.pace.usual);
+        let mut now = bridged.origin.partition_point(|row| *row < self.passed);
+        let last = bridged.origin.partition_point(|row| *row < end);
+        self.made_up += (last - now) - (end - self.passed);
+        while now < last {
+            let row = self.first + bridged.origin[now];
+            let torn = now > 0 && self.pace.is_torn(&bridged.recording, now);
+            if torn {
+                let time = &bridged.recording.time;
+                self.tears.push((row, time[now] - time[now - 1]));
+            }
+            if torn || !self.plan.keeps(row) {
+                self.end_stretch();
+            }
+            // To the next tear or border of a span.
+            let goes_on = |next: &usize| {
+                let origin = self.first + bridged.origin[*next];
+                origin / SPAN == row / SPAN && !self.pace.is_torn(&bridged.recording, *next)
+            };
+            let until = (now + 1..last).take_while(goes_on).last().unwrap_or(now) + 1;
+            if self.plan.keeps(row) {
+                self.stretch.extend(&bridged.recording, now..until);
+                self.origins.extend(bridged.origin[now..until].iter().map(|row| self.first + row));
+            }
+            now = until;
+        }
+        // What is kept of the recorded rows: some to tell what is lost beside, those that wait, and none that was made up.
+        let from = end.saturating_sub(CONTEXT);
+        let mut tail = TorqueRecording::like(&bridged.recording);
+        let recorded = |at: &usize| *at == 0 || bridged.origin[*at] != bridged.origin[*at - 1];
+        let all = bridged.origin.partition_point(|row| *row < from)..bridged.origin.len();
+        all.filter(recorded).for_each(|at| tail.extend(&bridged.recording, at..at + 1));
+        self.recorded = tail;
+        self.first += from;
+        self.passed = end - from;
+    }
+
+    /// Keeps every so manieth row of the stretch, as far as the filter knows it.
+    fn keep(&mut self, ends: bool) {
+        let rows = self.stretch.rows();
+        let known = if ends { rows } else { rows.saturating_sub(self.margin) };
+        let chosen: Vec<usize> = (self.next - self.begun..known).step_by(self.plan.every).collect();
+        if !chosen.is_empty() {
+            let number = self.stretches.len() as u32 + 1;
+            let n = self.stretch.joints;
+            let thinned = |values: &[f64]| -> Vec<f64> {
+                let mut courses: Vec<Vec<f64>> = (0..n).map(|joint| column(values, n, joint)).collect();
+                self.filter.apply(&mut courses);
+                chosen.iter().flat_map(|row| courses.iter().map(|course| course[*row])).collect()
+            };
+            let stretch = &self.stretch;
+            let block = TorqueRecording {
+                time: chosen.iter().map(|row| stretch.time[*row]).collect(),
+                position: thinned(&stretch.position),
+                velocity: stretch.velocity.as_deref().map(thinned),
+                torque: thinned(&stretch.torque),
+                temperature: stretch.temperature.as_ref().map(|all| chosen.iter().map(|row| all[*row]).collect()),
+                trajectory: vec![number; chosen.len()],
+                held_out: chosen.iter().map(|row| stretch.held_out[*row]).collect(),
+                ..TorqueRecording::like(stretch)
+            };
+            self.kept.extend(&block, 0..chosen.len());
+            self.origin.extend(chosen.iter().map(|row| self.origins[*row]));
+            self.next += chosen.len() * self.plan.every;
+        }
+        let spent = (self.next - self.begun).saturating_sub(self.margin).min(rows);
+        self.stretch.forget(spent);
+        self.origins.drain(..spent);
+        self.begun += spent;
+    }
+
+    fn end_stretch(&mut self) {
+        self.keep(true);
+        let first = self.stretches.last().map_or(0, |stretch| stretch.end);
+        if self.kept.rows() > first {
+            self.stretches.push(first..self.kept.rows());
+        }
+        self.stretch.forget(self.stretch.rows());
+        self.origins.clear();
+        (self.begun, self.next) = (0, 0);
+    }
+}

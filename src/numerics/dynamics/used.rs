@@ -1,0 +1,194 @@
+//! The rows of a recording that a diagnosis works on: all of them, or of a long recording those that memory has room for.
+
+use super::arm::DynamicArm;
+use super::bridge::{self, Bridged};
+use super::check;
+use super::clock::RecordingClock;
+use super::recording::TorqueRecording;
+use super::source::TorqueSource;
+use super::survey::RecordingSurvey;
+use super::thin::{ThinnedRecording, ThinningPlan};
+use crate::error::Result;
+
+/// Rows that are used as they were recorded; of longer recordings about so many are kept, however long they are.
+const MOST: usize = 1 << 17;
+
+/// Checked rows with their clock.
+pub(super) struct UsedRecording {
+    pub recording: TorqueRecording,
+    pub clock: RecordingClock,
+    /// Of each row: the recorded one, or the one before it where it is made up.
+    pub origin: Vec<usize>,
+    /// What is odd about it, a sentence each.
+    pub remarks: Vec<String>,
+}
+
+impl UsedRecording {
+    /// Of a recording whose cut-off will be at so many Hz, or is not known yet. Fails where it cannot be used.
+    pub fn of(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>) -> Result<Self> {
+        Self::within(arm, source, cutoff, MOST)
+    }
+
+    /// The same with room for another number of rows.
+    pub fn within(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
+        if source.rows() > most { Self::thinned(arm, source, cutoff, most) } else { Self::whole(arm, source) }
+    }
+
+    fn whole(arm: &DynamicArm, source: &dyn TorqueSource) -> Result<Self> {
+        let mut whole: Option<TorqueRecording> = None;
+        source.blocks(&mut |block| {
+            match &mut whole {
+                Some(whole) => whole.extend(block, 0..block.rows()),
+                None => whole = Some(block.clone()),
+            }
+            Ok(())
+        })?;
+        let whole = whole.unwrap_or_else(|| TorqueRecording::of_motion(source.joints(), Vec::new(), Vec::new()));
+        check::check(arm, &whole)?;
+        let recorded = whole.rows();
+        let Bridged { recording, origin } = Bridged::of(whole);
+        let clock = RecordingClock::of(&recording);
+        let odd = check::remarks(&recording, &origin, &clock);
+        let remarks = odd.into_iter().chain(bridge::remark(recording.rows() - recorded)).collect();
+        Ok(Self { recording, clock, origin, remarks })
+    }
+
+    fn thinned(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
+        let survey = RecordingSurvey::of(source)?;
+        let rate = 1.0 / survey.pace.usual;
+        let plan = ThinningPlan::new(source.rows(), rate, cutoff.unwrap_or(survey.cutoff), most);
+        let ThinnedRecording { recording, clock, origin, made_up, tears } = ThinnedRecording::of(source, &survey, &plan)?;
+        check::check(arm, &recording)?;
+        let mut remarks = vec![said(source.rows(), &recording, &plan, clock.rate)];
+        remarks.extend(tears.iter().map(|(row, lasted)| check::torn_at(*row, *lasted, survey.pace.usual)));
+        remarks.extend(check::of_clock_and_sets(&recording, 1.0 / clock.rate));
+        remarks.extend(bridge::remark(made_up));
+        Ok(Self { recording, clock, origin, remarks })
+    }
+}
+
+/// What was kept of a long recording.
+fn said(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rate: f64) -> String {
+    let [all, used] = plan.spans;
+    let spans = if used < all { format!(" of {used} of {all} equal spans") } else { String::new() };
+    format!(
+        "{rows} rows are more than are held at once: {} are used, every {}th{spans} after a low-pass without delay, {rate:.1} Hz",
+        kept.rows(),
+        plan.every
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::{arm, record_at};
+    use super::super::types::{TorqueDiagnosis, TorqueQuestion};
+    use super::*;
+
+    /// A recording that comes in blocks of so many rows.
+    struct Blocks(TorqueRecording, usize);
+
+    impl TorqueSource for Blocks {
+        fn joints(&self) -> usize {
+            self.0.joints
+        }
+        fn rows(&self) -> usize {
+            self.0.rows()
+        }
+        fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()> {
+            for start in (0..self.0.rows()).step_by(self.1) {
+                let mut block = TorqueRecording::like(&self.0);
+                block.extend(&self.0, start..(start + self.1).min(self.0.rows()));
+                take(&block)?;
+            }
+            Ok(())
+        }
+    }
+
+    /// 40 s at 2 kHz with friction in two joints.
+    fn long() -> TorqueRecording {
+        record_at(&arm(), 2000.0, 0.0, &|(joint, _, _, velocity, _, _)| match joint {
+            1 => 6.0 * (velocity / 0.01).tanh() + 9.0 * velocity,
+            2 => 3.0 * (velocity / 0.01).tanh(),
+            _ => 0.0,
+        })
+    }
+
+    fn names(diagnosis: &TorqueDiagnosis) -> Vec<String> {
+        let mut names: Vec<String> = diagnosis.findings.iter().map(|one| format!("{} {}", one.effect, one.place)).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_thinned_recording_tells_what_the_whole_one_does() {
+        let recording = Blocks(long(), 7001);
+        let diagnosed = |most: usize| {
+            let used = UsedRecording::within(&arm(), &recording, None, most).unwrap();
+            let rows = used.recording.rows();
+            (rows, super::super::diagnose_used(&arm(), used, &TorqueQuestion::default(), &mut |_| ()).unwrap())
+        };
+        let ((all, whole), (few, thinned)) = (diagnosed(usize::MAX), diagnosed(10_000));
+        assert!(all == 80_000 && few == 10_000, "{all} {few}");
+        assert_eq!(names(&whole), names(&thinned));
+        for (one, other) in whole.findings.iter().zip(&thinned.findings) {
+            for (a, b) in one.parameters.iter().zip(&other.parameters) {
+                let sigma = a.sigma.unwrap_or(0.0);
+                assert!((a.value - b.value).abs() < 0.5 * sigma, "{} {}: {} {} {sigma}", one.effect, a.name, a.value, b.value);
+            }
+        }
+        assert!((whole.after.nrmse_mean / thinned.after.nrmse_mean - 1.0).abs() < 0.05);
+        assert!(thinned.remarks[0].starts_with("80000 rows are more than are held at once: 10000 are used, every 8th"));
+    }
+
+    #[test]
+    fn it_does_not_matter_where_blocks_end() {
+        let recording = long();
+        let thinned = |block: usize| UsedRecording::within(&arm(), &Blocks(recording.clone(), block), None, 10_000).unwrap();
+        let (one, other) = (thinned(80_000), thinned(1500));
+        assert_eq!((one.origin, one.recording.time), (other.origin, other.recording.time));
+        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let far = apart(&one.recording.position, &other.recording.position);
+        let torque = apart(&one.recording.torque, &other.recording.torque);
+        assert!(far < 1e-9 && torque < 1e-6, "{far} {torque}");
+    }
+
+    #[test]
+    fn spans_are_left_out_evenly_and_gaps_are_seen_where_they_were() {
+        let plan = ThinningPlan::new(10_000_000, 500.0, 10.0, MOST);
+        assert_eq!((plan.every, plan.spans), (5, [306, 20]));
+        let mut recording = long();
+        recording.time[30_001..].iter_mut().for_each(|time| *time += 0.5);
+        // Three rows are lost.
+        let mut lost = TorqueRecording::like(&recording);
+        lost.extend(&recording, 0..50_000);
+        lost.extend(&recording, 50_003..80_000);
+        let used = UsedRecording::within(&arm(), &Blocks(lost, 4000), None, 10_000).unwrap();
+        assert_eq!(used.clock.stretches.len(), 2);
+        assert_eq!(used.origin[used.clock.stretches[1].start], 30_001);
+        let said = used.remarks.join("; ");
+        assert!(said.contains("row 30002: the clock jumps by 0.501 s") && said.contains("3 steps of the clock"), "{said}");
+        assert!((used.recording.time.last().unwrap() - 40.5).abs() < 0.005);
+    }
+
+    #[test]
+    fn a_saturated_torque_and_a_clock_that_goes_back_are_seen_before_rows_are_thinned() {
+        let refused = |spoilt: &dyn Fn(&mut TorqueRecording)| {
+            let mut recording = long();
+            spoilt(&mut recording);
+            let used = UsedRecording::within(&arm(), &Blocks(recording, 9000), None, 10_000);
+            used.err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        let saturated = refused(&|recording| {
+            let of_joint =
+                |recording: &TorqueRecording| -> Vec<f64> { recording.torque.iter().skip(1).step_by(4).copied().collect() };
+            let mut sorted = of_joint(recording);
+            sorted.sort_by(f64::total_cmp);
+            let most = sorted[70_000];
+            recording.torque.iter_mut().skip(1).step_by(4).for_each(|torque| *torque = torque.min(most));
+        });
+        assert!(saturated.contains("joint 2") && saturated.contains("cut off"), "{saturated}");
+        let back = refused(&|recording| recording.time[18_000] = 1.0);
+        assert!(back.contains("row 18001: the clock goes from"), "{back}");
+        assert!(refused(&|recording| recording.torque[4 * 20_000] = f64::NAN).contains("row 20001: not a finite number"));
+    }
+}

@@ -1,0 +1,84 @@
+//! Numbers by which something is decided stand in one room, each with its meaning, unit and source.
+
+use calib::criteria::TABLES;
+use std::collections::BTreeSet;
+
+use crate::source::sources;
+
+/// Kinds of sources.
+const KINDS: [&str; 5] = ["literature: ", "physics: ", "count: ", "measured by tests/reference/", "judgement: "];
+
+/// Rooms whose deciding numbers are in the tables.
+const ROOMS: [&str; 3] = ["numerics/diagnose/", "numerics/estimate/choose/", "numerics/estimate/screen/"];
+
+/// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
+const MECHANICS: [&str; 39] = [
+    "AMPLITUDES",
+    "ANGLE",
+    "ARCSEC",
+    "ARROWS",
+    "BATCH",
+    "BLOCK",
+    "CHUNK",
+    "COLUMNS",
+    "FINE",
+    "FITTED",
+    "FOLDS",
+    "FORMS",
+    "FREEDOMS",
+    "HIGHEST",
+    "INVISIBLE",
+    "LARGEST",
+    "LASTS",
+    "LISTED",
+    "LOWEST",
+    "MIN_SEPARATION_L",
+    "MOST",
+    "NEVER",
+    "NOTHING",
+    "OUTSIDE",
+    "PLACE",
+    "RIDGE",
+    "ROWS",
+    "SETTLED",
+    "SHARES",
+    "SHORT",
+    "SLIPS",
+    "SMALLEST",
+    "STEP",
+    "STEPS",
+    "THERE",
+    "TRAIL",
+    "TURN",
+    "TYPICAL",
+    "UNIT",
+];
+
+#[test]
+fn every_criterion_has_a_meaning_a_unit_and_a_source() {
+    let mut names = BTreeSet::new();
+    for row in TABLES.iter().copied().flatten() {
+        let called = format!("{}::{}", row.room, row.name);
+        assert!(!row.meaning.trim().is_empty() && !row.unit.is_empty(), "{called}");
+        assert!(KINDS.iter().any(|kind| row.source.starts_with(kind)), "{called}: source `{}`", row.source);
+        assert!(names.insert(called.clone()), "{called} twice");
+    }
+    assert!(names.len() > 150);
+}
+
+#[test]
+fn no_number_decides_outside_the_tables() {
+    let mut faults = Vec::new();
+    for source in sources().iter().filter(|source| ROOMS.iter().any(|room| source.file.starts_with(room))) {
+        let text = std::fs::read_to_string(format!("{}/src/{}", env!("CARGO_MANIFEST_DIR"), source.file)).unwrap();
+        for (at, line) in text.lines().enumerate() {
+            let Some((_, rest)) = line.split_once("const ") else { continue };
+            let Some((name, kind)) = rest.split_once(": ") else { continue };
+            let number = ["f64", "usize", "u64", "u32", "i64", "i32", "[f64", "[usize"].iter().any(|own| kind.starts_with(own));
+            if number && !MECHANICS.contains(&name) && name != "UNSEEN" {
+                faults.push(format!("{}:{}: {name}", source.file, at + 1));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "state meaning, unit and source in src/numerics/criteria:\n{}", faults.join("\n"));
+}
