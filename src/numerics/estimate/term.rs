@@ -1,7 +1,7 @@
 //! A term of the problem: what one row measured of one kind, in standard deviations, with Huber's loss.
 
 use crate::effect::PlacedRow;
-use crate::observation::{ExcessSigma, MeasurementKind, Numbers, Residual, Sensitivity, WIDEST};
+use crate::observation::{ExcessSigma, MeasurementKind, Residual, ResidualNumbers, Sensitivity, WIDEST};
 use crate::robot::Measurements;
 use crate::statistics::MEDIAN_CHI2;
 
@@ -12,7 +12,7 @@ pub(crate) const HUBER: f64 = 3.5;
 /// Weighted residual and derivatives of one kind in one row.
 pub(crate) struct ObservationTerm {
     /// Measured - predicted in standard deviations.
-    pub error: Numbers,
+    pub error: ResidualNumbers,
     pub axes: usize,
     sensitivity: Sensitivity,
 }
@@ -109,10 +109,10 @@ joints: [{name: A1}, {name: A2}]
             &ABOUT
         }
 
-        fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
+        fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
             let reading = self.reading(data, row)?;
             let left = |k: usize| reading.values[k] - Vector3::from(LINES[k]).dot(&placed.point);
-            Some((Numbers::new([0, 1, 2, 3, 4].map(left)), reading.sigma * reading.sigma))
+            Some((ResidualNumbers::new([0, 1, 2, 3, 4].map(left)), reading.sigma * reading.sigma))
         }
 
         fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {

@@ -18,7 +18,7 @@ mod weight;
 pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
-pub use numbers::{Numbers, WIDEST};
+pub use numbers::{ResidualNumbers, WIDEST};
 pub use orientation::Orientation;
 pub use planar::Planar;
 pub use plane::PlaneKind;
@@ -147,7 +147,7 @@ pub trait MeasurementKind: Sync {
 
     /// Measured - predicted (m or rad, zero where a number was not measured) and the variance of each number; `None` where the row
     /// measured none, or the robot lacks what it was measured from.
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)>;
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)>;
 
     /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity;
@@ -195,7 +195,7 @@ pub trait MeasurementKind: Sync {
     }
 
     /// The error (m or rad) in standard deviations of the instrument alone, squared and summed.
-    fn stated(&self, data: &Measurements, row: usize, error: &Numbers) -> f64 {
+    fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
         self.reading(data, row).map_or(0.0, |reading| error.norm_squared() / (reading.sigma * reading.sigma))
     }
 

@@ -7,12 +7,12 @@ pub const WIDEST: usize = 8;
 
 /// Measured - predicted of one kind in one row, in its unit or in standard deviations; as a slice it is as wide as the kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Numbers {
+pub struct ResidualNumbers {
     values: [f64; WIDEST],
     count: usize,
 }
 
-impl Numbers {
+impl ResidualNumbers {
     /// Of so many numbers, [`WIDEST`] at most.
     pub fn new<const N: usize>(own: [f64; N]) -> Self {
         let mut values = [0.0; WIDEST];
@@ -49,7 +49,7 @@ impl Numbers {
     }
 }
 
-impl std::ops::Deref for Numbers {
+impl std::ops::Deref for ResidualNumbers {
     type Target = [f64];
 
     fn deref(&self) -> &[f64] {
@@ -57,7 +57,7 @@ impl std::ops::Deref for Numbers {
     }
 }
 
-impl From<Vector3<f64>> for Numbers {
+impl From<Vector3<f64>> for ResidualNumbers {
     fn from(values: Vector3<f64>) -> Self {
         Self::new(values.into())
     }

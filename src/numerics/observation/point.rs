@@ -1,6 +1,6 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Length;
@@ -67,7 +67,7 @@ impl MeasurementKind for PointKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(ResidualNumbers, f64)> {
         // Each axis has a variance of its own: see `weight`.
         (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point).into(), f64::NAN))
     }
@@ -106,7 +106,7 @@ impl MeasurementKind for PointKind {
         (data.points.axes(row) > 0).then(|| data.points.sigma[row].map(finite).norm())
     }
 
-    fn stated(&self, data: &Measurements, row: usize, error: &Numbers) -> f64 {
+    fn stated(&self, data: &Measurements, row: usize, error: &ResidualNumbers) -> f64 {
         error.iter().zip(&data.points.sigma[row]).map(|(error, sigma)| (error / sigma) * (error / sigma)).sum()
     }
 

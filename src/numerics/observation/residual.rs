@@ -1,6 +1,6 @@
 //! What is left of what a row measured of one kind.
 
-use super::{Dimension, MeasurementKind, Numbers, Sensitivity, Weight};
+use super::{Dimension, MeasurementKind, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 
@@ -31,7 +31,7 @@ pub struct Residual {
     /// Of the recording.
     pub row: usize,
     /// m or rad, as many numbers as the kind has; 0 where one was not measured.
-    pub error: Numbers,
+    pub error: ResidualNumbers,
     /// How many values were measured.
     pub axes: usize,
     /// Of each value, where the kind has one for all.
@@ -56,7 +56,7 @@ impl Residual {
     }
 
     /// The error in standard deviations.
-    pub fn whitened(&self, data: &Measurements, excess: f64) -> Numbers {
+    pub fn whitened(&self, data: &Measurements, excess: f64) -> ResidualNumbers {
         self.weight(data, excess).whiten(&self.error)
     }
 

@@ -1,6 +1,6 @@
 //! A linear map of errors or derivatives, above all into standard deviations.
 
-use super::Numbers;
+use super::ResidualNumbers;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -44,7 +44,7 @@ impl Weight {
     }
 
     /// A residual in standard deviations.
-    pub fn whiten(&self, error: &Numbers) -> Numbers {
+    pub fn whiten(&self, error: &ResidualNumbers) -> ResidualNumbers {
         match self {
             Self::Uniform(weight) => error.times(*weight),
             Self::Axes(_) | Self::Full(_) | Self::Along(_) => error.with_first_three(&self.apply(&error.first_three())),

@@ -12,7 +12,7 @@ use crate::effect::{
     Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
-use crate::observation::{MeasurementKind, Numbers, Residual, kinds};
+use crate::observation::{MeasurementKind, Residual, ResidualNumbers, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use autocorrelated::AutocorrelatedNoise;
 use autocorrelated::Innovations;
@@ -57,7 +57,7 @@ impl<'a> WhitenedProblem<'a> {
                 let (error, lines) = (weight.whiten(&residual.error), kind.lines(data, *row));
                 Some((SeenReading { kind: *kind, lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
             };
-            let seen: Vec<(SeenReading, Numbers)> = kinds.iter().filter_map(seen).collect();
+            let seen: Vec<(SeenReading, ResidualNumbers)> = kinds.iter().filter_map(seen).collect();
             let motion = if turns { EffectStack::target_motion } else { EffectStack::point_motion };
             (motion(&model.stack, &model.robot, data, *row, &model.x, scratch), seen)
         };
