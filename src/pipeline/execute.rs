@@ -10,6 +10,7 @@ use crate::store::{Account, FinishedFile, PendingTable, PublishedTable, Store, T
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 /// Where a stage is executed.
 pub(super) struct ExecutionSite<'a> {
@@ -62,17 +63,31 @@ pub(super) fn stage(
 }
 
 /// A table that a stage reads chunk by chunk.
-struct LongTable(PublishedTable);
+struct LongTable {
+    table: PublishedTable,
+    /// All of it, where that is no more than a chunk: it is decoded once.
+    whole: OnceLock<Frame>,
+}
+
+/// Rows of a table that is held whole once it was read.
+const SHORT: usize = 1 << 16;
 
 impl StoredTable for LongTable {
     fn rows(&self) -> usize {
-        self.0.rows()
+        self.table.rows()
     }
     fn frame(&self) -> Result<Frame> {
-        self.0.frame()
+        self.table.frame()
     }
     fn chunks(&self, take: &mut dyn FnMut(&Frame) -> Result<()>) -> Result<()> {
-        self.0.chunks(take)
+        if self.rows() > SHORT {
+            return self.table.chunks(take);
+        }
+        if let Some(whole) = self.whole.get() {
+            return take(whole);
+        }
+        let whole = self.frame()?;
+        take(self.whole.get_or_init(|| whole))
     }
 }
 
@@ -87,7 +102,7 @@ fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String
                 let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
                 let table = run_state::table(tables, from, origin.port)?;
                 let input: Input = match input.port.chunked {
-                    true => Box::new(LongTable(store.published(table)?)),
+                    true => Box::new(LongTable { table: store.published(table)?, whole: OnceLock::new() }),
                     false => Box::new(store.load(table)?),
                 };
                 Ok((from.id.clone(), input))

@@ -119,9 +119,12 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     faults
 }
 
+/// Time (s) and trajectory of a row.
+type Stamp = (f64, u32);
+
 /// Numbers that are none, and a clock that does not ascend, in rows that begin at row `first` of the recording, after one of this time and
 /// trajectory.
-pub(super) fn row_faults(rows: &TorqueRecording, first: usize, before: Option<(f64, u32)>) -> Vec<Fault> {
+pub(super) fn row_faults(rows: &TorqueRecording, first: usize, before: Option<Stamp>) -> Vec<Fault> {
     let n = rows.joints.max(1);
     let not_a_number = |(name, values, each): (&'static str, &Vec<f64>, usize)| {
         let at = values.iter().position(|value| !value.is_finite())?;
@@ -135,7 +138,7 @@ pub(super) fn row_faults(rows: &TorqueRecording, first: usize, before: Option<(f
     let all = || rows.time.iter().copied().zip(rows.trajectory.iter().copied());
     let pairs = before.into_iter().chain(all()).zip(all().skip(usize::from(before.is_none())));
     let row = first + usize::from(before.is_none()) + 1;
-    let back = |(row, ((then, from), (now, to))): (usize, ((f64, u32), (f64, u32)))| {
+    let back = |(row, ((then, from), (now, to))): (usize, (Stamp, Stamp))| {
         let message = || format!("row {row}: the clock goes from {then} s to {now} s; it must ascend");
         (now <= then && from == to).then(|| fault("time", message()))
     };

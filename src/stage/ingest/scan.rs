@@ -72,6 +72,15 @@ pub(super) struct PackedRows {
 }
 
 impl PackedRows {
+    /// No rows of an opened file.
+    fn of(reading: &OpenedFile, layout: &FileLayout, arm: &RobotJoints) -> Self {
+        Self {
+            slots: reading.binding().slots(),
+            texts: arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect(),
+            targets: reading.binding().points.len(),
+            ..Self::default()
+        }
+    }
     fn push(&mut self, row: &RecordedRow, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
         self.points.extend((0..self.targets).map(|k| row.points.get(k).copied().unwrap_or([f64::NAN; 3])));
@@ -190,13 +199,7 @@ pub(super) fn scan(
     context.services.begin(&format!("reading {label}"), size, "bytes");
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
-    let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
-    let packed = (joined && index > 0).then(|| PackedRows {
-        slots: slots.clone(),
-        texts: texts(),
-        targets: reading.binding().points.len(),
-        ..PackedRows::default()
-    });
+    let packed = (joined && index > 0).then(|| PackedRows::of(&reading, layout, arm));
     let mut scan = Scan::new(label, slots, packed);
     let mut measured = reading.binding().measures.then(blake3::Hasher::new);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
