@@ -8,8 +8,8 @@ use super::file::{Groups, PriorBy, PriorFrom};
 use super::ledger::{Ending, Ledger};
 use super::recalibration::Earlier;
 use crate::error::Result;
-use crate::pipeline::Override;
 use crate::table::{Parameters, Table};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Mean and standard deviation, in the unit of the table `parameters`.
@@ -44,11 +44,10 @@ impl Fleet {
                     PriorBy::Robot => known.own(&robot.name),
                     PriorBy::Model => known.pooled(&robot.name, &robot.groups),
                 };
-                let entries: Vec<String> =
-                    priors.iter().map(|(name, (mean, sigma))| format!("{name}: {{mean: {mean:e}, sigma: {sigma:e}}}")).collect();
-                if !entries.is_empty() {
-                    let value = format!("{{{}}}", entries.join(", "));
-                    robot.sets.push(Override { target: format!("{}.prior", wanted.stage), value });
+                if !priors.is_empty() {
+                    let entry = |(name, (mean, sigma))| (name, json!({ "mean": mean, "sigma": sigma }));
+                    let priors = Value::Object(priors.into_iter().map(entry).collect());
+                    robot.set_values(&BTreeMap::from([(format!("{}.prior", wanted.stage), priors)]));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! What identifications and diagnoses say of rows in which the target was only brought to something: how well it closes, which rows stand
 //! out, and what such data tell of the scale of the arm.
 
-use crate::effect::AnchorShift;
+use crate::effect::names;
 use crate::error::counted;
 use crate::estimate::{Fitted, Model, ParameterStatus, reseated, scale};
 use crate::observation::{MeasurementKind, kinds};
@@ -197,7 +197,7 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
 /// Points that anchors are.
 fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let setup = model.robot.setup();
-    let first = model.stack.parameters_of(AnchorShift::NAME).next().unwrap_or_default();
+    let first = model.stack.parameters_of(names::ANCHOR).next().unwrap_or_default();
     let all = setup.anchors.iter().enumerate().filter(|(_, anchor)| anchor.shape == Shape::Point);
     let place = |(number, anchor): (usize, &crate::robot::Anchor)| {
         let at = first + setup.first_of_anchor(number);

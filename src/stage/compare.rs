@@ -1,6 +1,6 @@
 //! `compare`: what changed on the robot since an earlier recording of it; the earlier model is the prior and the comparison.
 
-use crate::effect::{BaseFrame, Load};
+use crate::effect::{Load, names};
 use crate::error::Result;
 use crate::estimate::{FitOptions, Fitted, Model, Prior, Session, align, changes};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
@@ -160,8 +160,8 @@ impl Compare {
             context.services.note(format!("{which} recording states no noise: rows are weighted by an assumed one"));
         }
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
-        let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;
-        let base: Vec<usize> = model.stack.parameters_of(BaseFrame::NAME).collect();
+        let mut model = placed.model(robot.clone(), &[names::BASE_FRAME], Load::GravityTorque)?;
+        let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
         for (k, spec) in model.stack.specs().iter().enumerate().filter(|(k, _)| !base.contains(k)) {
             let prior = Prior { mean: model.x[k], sigma: spec.prior_sigma };
             model.known.entry(k).or_default().prior = Some(prior);

@@ -1,7 +1,7 @@
 //! What the findings of a model depend on: only that is worth a remark where it was never visited.
 
 use crate::diagnose::BASE;
-use crate::effect::{AnchorShift, Variable};
+use crate::effect::{Variable, names};
 use crate::estimate::Model;
 use crate::robot::Unmeasured;
 
@@ -19,7 +19,7 @@ impl Dependence {
         for (effect, _) in model.stack.effects() {
             match effect.form() {
                 Some(form) => form.variables().into_iter().for_each(|variable| out.on(variable)),
-                None if [&BASE[..], &[AnchorShift::NAME]].concat().contains(&effect.name()) => {}
+                None if [&BASE[..], &[names::ANCHOR]].concat().contains(&effect.name()) => {}
                 None => out.joints.fill(true),
             }
             if effect.needs_torque() {

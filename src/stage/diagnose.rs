@@ -1,7 +1,7 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
-use crate::effect::{BaseFrame, CAUSES};
+use crate::effect::{CAUSES, names};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
@@ -96,7 +96,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 24;
+    const IMPLEMENTATION: u32 = 25;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -113,7 +113,7 @@ impl Stage for Diagnose {
             let allowed: Vec<&str> = tried().collect();
             faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{}", instead(name, &allowed))));
         }
-        if let Some(k) = self.without.iter().position(|name| name == BaseFrame::NAME) {
+        if let Some(k) = self.without.iter().position(|name| name == names::BASE_FRAME) {
             let message = "`base_frame` places the robot before the instrument: without it nothing can be diagnosed";
             faults.push(Fault::new(format!("without[{k}]"), message));
         }

@@ -3,7 +3,7 @@
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
 use crate::diagnose::{Question, wrong_setup};
-use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, identified, names, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out};
 use crate::observation;
@@ -106,13 +106,13 @@ impl Stage for Identify {
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in asked.filter_map(|cause| cause.whole(&setting)) {
-            if effect.name() == AnchorShift::NAME && robot.setup().anchors.is_empty() {
+            if effect.name() == names::ANCHOR && robot.setup().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
                 Some(reason) => context.services.note(format!("{} is left out: {reason}", effect.name())),
                 None => {
-                    let by_weight = effect.name() == JointCompliance::NAME && matches!(self.load, LoadSetting::Gravity);
+                    let by_weight = effect.name() == names::JOINT_COMPLIANCE && matches!(self.load, LoadSetting::Gravity);
                     if let Some(links) = weightless_links(&robot, &data, &rows).filter(|_| by_weight) {
                         context.services.warn(links.warning);
                     }
@@ -213,7 +213,7 @@ const OF_THE_ARM: std::ops::Range<usize> = 3..5;
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
     let anchored = !model.robot.setup().anchors.is_empty();
-    let mut needed = GEOMETRY.iter().filter(|name| **name != AnchorShift::NAME || anchored);
+    let mut needed = GEOMETRY.iter().filter(|name| **name != names::ANCHOR || anchored);
     let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model
         .stack
@@ -239,11 +239,11 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
             ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
             _ => false,
         };
-        model.stack.parameters_of(ReductionRatio::NAME).filter(beyond).collect()
+        model.stack.parameters_of(names::REDUCTION_RATIO).filter(beyond).collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = whole(JointCompliance::NAME, setting) else { return };
-    let asked = model.stack.effects().any(|(effect, _)| effect.name() == JointCompliance::NAME);
+    let Some(compliance) = whole(names::JOINT_COMPLIANCE, setting) else { return };
+    let asked = model.stack.effects().any(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
     if suspects.is_empty() || asked {
         return;
     }
@@ -270,7 +270,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
         context.services.warn(format!(
             "{opening}; with `{}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
-            JointCompliance::NAME,
+            names::JOINT_COMPLIANCE,
             list(&rival, &suspects),
             fitted.excess_sigma * 1e3,
             refitted.excess_sigma * 1e3

@@ -3,7 +3,7 @@
 //! Figures are in the unit that the table `parameters` shows for each (mm, rad, rad/Nm, ...). Where several patterns of one
 //! setting match a parameter the longest counts.
 
-use crate::effect::{BaseFrame, identified};
+use crate::effect::{identified, names};
 use crate::error::{Fault, nearest};
 use crate::estimate::{Bounds, Known, Model, Prior};
 use crate::stage::Context;
@@ -45,7 +45,7 @@ impl ParameterSet<'_> {
         let mut faults = Vec::new();
         for (setting, pattern) in self.patterns() {
             let effect = pattern.split('.').next().unwrap_or_default();
-            let base = matches!(setting, "prior" | "bounds") && effect == BaseFrame::NAME;
+            let base = matches!(setting, "prior" | "bounds") && effect == names::BASE_FRAME;
             if base {
                 let message = "where the robot stands in the tracker's frame is found by alignment: only `free` and `hold` apply";
                 faults.push(Fault::new(format!("{setting}.{pattern}"), message));
@@ -93,7 +93,7 @@ impl ParameterSet<'_> {
         let any = |patterns: &[String], name: &str| patterns.iter().any(|pattern| matches(pattern, name));
         let wanted = |name: &str| self.free.is_none_or(|free| any(free, name)) && !any(self.hold, name);
         let (candidates, held): (Vec<usize>, Vec<usize>) = open.iter().partition(|k| wanted(&specs[**k].name));
-        let base: Vec<usize> = model.stack.parameters_of(BaseFrame::NAME).collect();
+        let base: Vec<usize> = model.stack.parameters_of(names::BASE_FRAME).collect();
         let mut known = BTreeMap::new();
         for &k in candidates.iter().filter(|k| !base.contains(k)) {
             let (name, unit) = (&specs[k].name, specs[k].unit);

@@ -1,6 +1,6 @@
 //! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
-use crate::effect::JointCompliance;
+use crate::effect::names;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::FitOptions;
 use crate::robot::{RobotModel, Visited};
@@ -51,12 +51,12 @@ impl Stage for Stiffness {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
-        let mut model = reads.parameters.model(robot, &[JointCompliance::NAME], self.load.into())?;
-        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == JointCompliance::NAME);
+        let mut model = reads.parameters.model(robot, &[names::JOINT_COMPLIANCE], self.load.into())?;
+        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
         if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data)) {
             return Err(Error::data("with.load", format!("no joint load is known: {reason}")));
         }
-        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{}.j{joint}", JointCompliance::NAME)).collect();
+        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{}.j{joint}", names::JOINT_COMPLIANCE)).collect();
         let specs = model.stack.specs();
         if let Some(unknown) = wanted.iter().find(|name| !specs.iter().any(|spec| spec.name == **name)) {
             return Err(Error::spec(
@@ -65,7 +65,7 @@ impl Stage for Stiffness {
             ));
         }
         let chosen = |k: &usize| wanted.is_empty() || wanted.contains(&specs[*k].name);
-        let own: Vec<usize> = model.stack.parameters_of(JointCompliance::NAME).collect();
+        let own: Vec<usize> = model.stack.parameters_of(names::JOINT_COMPLIANCE).collect();
         let open: Vec<usize> = own.iter().copied().filter(chosen).collect();
         let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);

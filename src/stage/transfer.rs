@@ -5,7 +5,7 @@ mod comparison;
 mod source;
 
 use crate::diagnose::BASE;
-use crate::effect::{AnchorShift, BaseFrame, LONG_AFTER};
+use crate::effect::{LONG_AFTER, names};
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
 use crate::robot::{Measurements, RobotModel, Visited};
@@ -77,7 +77,7 @@ impl Stage for Transfer {
         let mut model = self.placed(&earlier, &reads, &data, &rows)?;
         let open: Vec<usize> = match self.free {
             Some(_) => (0..model.x.len()).collect(),
-            None => model.stack.parameters_of(BaseFrame::NAME).collect(),
+            None => model.stack.parameters_of(names::BASE_FRAME).collect(),
         };
         let (candidates, held) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
@@ -160,7 +160,7 @@ impl Transfer {
             None => stripped(&carried.earlier),
         };
         let start = self.placed(&geometry, reads, data, rows)?;
-        let candidates: Vec<usize> = start.stack.parameters_of(BaseFrame::NAME).collect();
+        let candidates: Vec<usize> = start.stack.parameters_of(names::BASE_FRAME).collect();
         let options = FitOptions { rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&start, data, &options, &reads.split, self.screen);
         let sides = sides(data, rows, [&carried.screening, &screening]);
@@ -187,7 +187,7 @@ impl Transfer {
 
 /// Whether a parameter is of the rigid arm, its gears or what it was measured to.
 fn is_geometry(row: &ParameterRow) -> bool {
-    row.form.is_none() && (row.effect == AnchorShift::NAME || BASE.contains(&row.effect.as_str()))
+    row.form.is_none() && (row.effect == names::ANCHOR || BASE.contains(&row.effect.as_str()))
 }
 
 /// Whole points by which one of two carried models is chosen, those that place their base, and by which both are judged, all others, or

@@ -25,12 +25,12 @@ crate::table::rows! { "parameters",
         remark: Option<String>,
         /// The effect's place and shape as JSON, for effects that a diagnosis added; null for effects of the whole arm.
         form: Option<String>,
+        /// `outside_simulation` where the parameters say nothing of the robot file; else null.
+        corrects: Option<String>,
     }
 }
 
-use crate::effect::{
-    AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, JointCompliance, Load, ToolOffset, identified, whole,
-};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, names, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
@@ -52,15 +52,10 @@ pub enum Corrected {
 }
 
 impl Corrected {
-    /// The first sentence of the remarks that say so.
-    const OUTSIDE: &str = "corrects the outside simulation, not the robot file's model";
-
-    fn of(row: &ParameterRow) -> Self {
-        match row.remark.as_deref().and_then(|remark| remark.split("; ").next()) {
-            Some(Self::OUTSIDE) => Self::OutsideSimulation,
-            _ => Self::RobotFile,
-        }
-    }
+    /// As the column holds what does not correct the robot file.
+    const OUTSIDE: &str = "outside_simulation";
+    /// What people read of it.
+    const REMARK: &str = "corrects the outside simulation, not the robot file's model";
 }
 
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
@@ -138,6 +133,7 @@ impl Parameters {
                     step: step.into(),
                     remark,
                     form: form.clone(),
+                    corrects: None,
                 });
             }
         }
@@ -155,12 +151,13 @@ impl Parameters {
         self
     }
 
-    /// The same, with what they correct in their remarks.
+    /// The same, with what they correct, which their remarks tell people.
     pub fn correcting(mut self, corrected: Corrected) -> Self {
         if corrected == Corrected::OutsideSimulation {
-            let outside = Corrected::OUTSIDE;
             for row in &mut self.0 {
-                row.remark = Some(row.remark.take().map_or_else(|| outside.into(), |remark| format!("{outside}; {remark}")));
+                row.corrects = Some(Corrected::OUTSIDE.into());
+                let remarks = [Some(Corrected::REMARK.to_string()), row.remark.take()];
+                row.remark = Some(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
             }
         }
         self
@@ -168,8 +165,10 @@ impl Parameters {
 
     /// What these correct: of an outside simulation they say nothing of the robot file's model.
     pub fn corrected(&self) -> Corrected {
-        let outside = self.0.iter().map(Corrected::of).find(|corrected| *corrected == Corrected::OutsideSimulation);
-        outside.unwrap_or(Corrected::RobotFile)
+        // Tables before version 1.2 say it in their remarks alone, and must not correct commands.
+        let said = |row: &ParameterRow| row.remark.as_deref().is_some_and(|remark| remark.starts_with(Corrected::REMARK));
+        let outside = self.0.iter().any(|row| row.corrects.as_deref() == Some(Corrected::OUTSIDE) || said(row));
+        if outside { Corrected::OutsideSimulation } else { Corrected::RobotFile }
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
@@ -205,7 +204,7 @@ impl Parameters {
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
     pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let compliance = self.0.iter().find(|row| row.effect == JointCompliance::NAME && row.form.is_none());
+        let compliance = self.0.iter().find(|row| row.effect == names::JOINT_COMPLIANCE && row.form.is_none());
         let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
         let robot = self.with_setup(robot);
         let setting = EffectContext { base, load };
@@ -218,8 +217,8 @@ impl Parameters {
         let targets = !robot.setup().targets.is_empty();
         // Where these stand is their start: nothing is left to correct.
         let stands = |row: &ParameterRow| match row.effect.as_str() {
-            BaseFrame::NAME | AnchorShift::NAME => true,
-            effect => targets && effect == ToolOffset::NAME,
+            names::BASE_FRAME | names::ANCHOR => true,
+            effect => targets && effect == names::TOOL_OFFSET,
         };
         for row in self.0.iter().filter(|row| !stands(row)) {
             let position = model.stack.specs().iter().position(|spec| spec.name == row.name);
@@ -237,13 +236,13 @@ impl Parameters {
     /// The robot with the targets and anchors that the parameters place.
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors = self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| self.anchor(name, &stand));
+        let anchors = self.placed(names::ANCHOR).into_iter().map(|(name, stand)| self.anchor(name, &stand));
         let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
             self.0.iter().any(|row| row.name == rx)
         };
-        let targets = self.placed(ToolOffset::NAME);
+        let targets = self.placed(names::TOOL_OFFSET);
         if targets.keys().any(|name| !name.is_empty()) || turned("") {
             let target = |(name, stand): (String, Pose)| Target {
                 seat: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
@@ -293,7 +292,7 @@ impl Parameters {
         let (translation, rotation) = (base.translation, base.rotation_vector());
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
-                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
+                let name = format!("{}.{ending}{name}", names::BASE_FRAME);
                 self.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
             }
         }
@@ -303,7 +302,7 @@ impl Parameters {
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.
     pub fn base_pose(&self) -> Pose {
         let value = |axis: &str, unit: Unit| {
-            let name = format!("{}.{axis}", BaseFrame::NAME);
+            let name = format!("{}.{axis}", names::BASE_FRAME);
             self.0.iter().find(|row| row.name == name).map_or(0.0, |row| unit.to_si(row.value))
         };
         let translation = ["x", "y", "z"].map(|axis| value(axis, Unit::Millimetre));
@@ -336,7 +335,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_corrected_is_the_first_sentence_of_a_remark_and_no_other() {
+    fn what_is_corrected_is_a_column_and_what_older_tables_say_first() {
         let row = |remark: Option<&str>| ParameterRow {
             name: "joint_offset.j2".into(),
             effect: "joint_offset".into(),
@@ -350,6 +349,7 @@ mod tests {
             step: "diagnose".into(),
             remark: remark.map(String::from),
             form: None,
+            corrects: None,
         };
         let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
         for remark in [None, Some("moves with another")] {
@@ -359,7 +359,8 @@ mod tests {
             let outside = bare.correcting(Corrected::OutsideSimulation);
             assert_eq!(outside.with_advice(&advice).corrected(), Corrected::OutsideSimulation);
         }
-        let mentioned = format!("not so: {}", Corrected::OUTSIDE);
+        let mentioned = format!("not so: {}", Corrected::REMARK);
         assert_eq!(Parameters(vec![row(Some(&mentioned))]).corrected(), Corrected::RobotFile);
+        assert_eq!(Parameters(vec![row(Some(Corrected::REMARK))]).corrected(), Corrected::OutsideSimulation);
     }
 }

@@ -66,6 +66,7 @@ fn curves_of(
                 step: "diagnose".into(),
                 remark: None,
                 form: Some(text.clone()),
+                corrects: None,
             });
         }
     }

@@ -12,6 +12,7 @@ mod alone;
 mod arms;
 mod beyond;
 mod bucket;
+mod cause_names;
 mod check;
 mod circles;
 mod cmd;

@@ -14,7 +14,7 @@ mod twins;
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
-use calib::effect::AnchorShift;
+use calib::effect::names;
 use calib::error::Result;
 use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::{Measurements, Named, RobotModel};
@@ -176,7 +176,7 @@ fn fitted_with(
 
 /// Where a fit has the sockets, m.
 fn places_of(model: &Model) -> BTreeMap<String, Vector3<f64>> {
-    let first = model.stack.parameters_of(AnchorShift::NAME).next().expect("anchors");
+    let first = model.stack.parameters_of(names::ANCHOR).next().expect("anchors");
     let all = model.robot.setup().anchors.iter().enumerate();
     all.map(|(k, anchor)| (anchor.name.clone(), anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3])))
         .collect()

@@ -5,7 +5,7 @@
 //! command all the same, with a remark that says so.
 
 use super::{CorrectedCommand, Remark};
-use crate::effect::Place;
+use crate::effect::{Place, names};
 use crate::estimate::Model;
 use crate::units::Quantity;
 use std::collections::BTreeMap;
@@ -85,9 +85,9 @@ impl Gate {
     /// What of a model is further from the robot file than allowed, a sentence each. Targets that the robot file names apart from its
     /// tool are of the measurement, and free.
     pub fn beyond(&self, model: &Model) -> Vec<String> {
-        const BY_FILE: [&str; 3] = ["tool_offset", "joint_offset", "link_geometry"];
+        const BY_FILE: [&str; 3] = [names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY];
         let measured_apart = !model.robot.setup().targets.is_empty();
-        let held = |name: &str| BY_FILE.contains(&name) && !(name == "tool_offset" && measured_apart);
+        let held = |name: &str| BY_FILE.contains(&name) && !(name == names::TOOL_OFFSET && measured_apart);
         let specs = model.stack.specs();
         let mut distances: BTreeMap<String, (f64, f64)> = BTreeMap::new();
         for (effect, range) in model.stack.effects().filter(|(effect, _)| held(effect.name())) {

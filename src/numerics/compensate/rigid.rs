@@ -5,14 +5,14 @@
 use super::arm::IdentifiedArm;
 use super::solve::Chain;
 use crate::description::RobotDescription;
-use crate::effect::Place;
+use crate::effect::{Place, names};
 use crate::estimate::Model;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Twist;
 use nalgebra::{Matrix3, Vector3};
 
 /// Effects that a description holds.
-const RIGID: [&str; 4] = ["base_frame", "tool_offset", "link_geometry", "joint_offset"];
+const RIGID: [&str; 4] = [names::BASE_FRAME, names::TOOL_OFFSET, names::LINK_GEOMETRY, names::JOINT_OFFSET];
 
 /// What a rigid description leaves out.
 #[derive(Debug, Clone, PartialEq)]

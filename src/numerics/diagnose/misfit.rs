@@ -1,7 +1,7 @@
 //! What a model leaves of the rows, against their noise.
 
 use super::types::Question;
-use super::verdict_statement::Ground;
+use super::words::Ground;
 use crate::criteria::noise::{LOUD, TOO_LOUD};
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise};

@@ -7,9 +7,10 @@
 //! Before all of it a wrong `setup` is looked for: physics that is found on top of one is none.
 //!
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
-//! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
+//! in the end `judge` asks folds of the rows to fit, the `verdict` decides what stands and how it is called, and `words` say so.
 
 mod closed_form;
+mod finding_groups;
 mod judge;
 mod locate;
 mod misfit;
@@ -23,7 +24,7 @@ mod setup;
 mod too_few;
 mod types;
 mod unasked;
-mod verdict_statement;
+mod verdict;
 mod whitened;
 mod words;
 
@@ -35,15 +36,16 @@ pub use types::{
     ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question,
     RivalCause, SETUP, SpectrumLine, VerdictKind,
 };
-pub use words::other_means;
+pub use verdict::other_means;
 
+use crate::criteria::judge::RIVALS;
 use crate::criteria::search::{FEWEST, SIGNIFICANT};
 use crate::effect::Form;
 use judge::{ModelComparison, judge};
 use locate::locate;
 use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
 use search::{CauseSearch, SearchOptions};
-use words::{LastRound, conclude};
+use verdict::{LastRound, conclude};
 
 /// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
 /// a [`wrong_setup`] before.
@@ -94,7 +96,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         let next = fitter.held_to_a_common_size(next);
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
-        tell(words::of_the_judgement(&next));
+        tell(words::of_the_judgement(&next, *RIVALS));
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
         let settled = open_world::settle(judged, found.last <= *SIGNIFICANT, search.pool, &survey, &fitter, &mut tell);

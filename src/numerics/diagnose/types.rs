@@ -1,6 +1,6 @@
 //! What a diagnosis is asked, and what it answers.
 
-use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, Place};
+use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, Place, names};
 use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::observation::Dimension;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
@@ -128,13 +128,11 @@ pub struct ClosedForm {
 
 /// What a wrong set-up is called.
 pub const SETUP: &str = "setup";
-/// Effects that are faults of the recording, not of the robot.
-const FAULTS: [&str; 4] = ["outlier", "mislabelled_point", "joint_log_lag", SETUP];
 
 impl Finding {
     /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording, which has no evidence.
     pub fn is_physics(&self) -> bool {
-        self.evidence.is_some() && !FAULTS.contains(&self.effect)
+        self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)
     }
 
     /// Whether nothing but a shape stands behind it.

@@ -2,7 +2,7 @@
 
 use super::misfit::Misfit;
 use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, VerdictKind};
-use super::verdict_statement::statement;
+use super::words::statement;
 use crate::effect::{BasePlacement, Effect, EffectStack};
 use crate::estimate::{Fitted, Model, Screening, align};
 

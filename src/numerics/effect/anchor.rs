@@ -3,7 +3,7 @@
 //! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
 //! centre and `radius`.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::{Anchor, RobotModel, Shape};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -13,12 +13,9 @@ use nalgebra::Vector3;
 pub struct AnchorShift;
 
 impl AnchorShift {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "anchor";
-
     /// What the names of an anchor's parameters begin with, dot included.
     pub fn prefix(anchor: &str) -> String {
-        if anchor.is_empty() { format!("{}.", Self::NAME) } else { format!("{}.{anchor}.", Self::NAME) }
+        if anchor.is_empty() { format!("{}.", names::ANCHOR) } else { format!("{}.{anchor}.", names::ANCHOR) }
     }
 
     /// Endings of the names of an anchor's parameters.
@@ -34,7 +31,7 @@ impl AnchorShift {
 impl Cause for AnchorShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "anchor",
+            name: names::ANCHOR,
             place: "anchor",
             formula: "what is measured from is elsewhere: the end of a draw-wire or ballbar, a socket, a plane, a sphere; it moves no point",
             size: "any",
@@ -50,7 +47,7 @@ impl Cause for AnchorShift {
 
 impl Effect for AnchorShift {
     fn name(&self) -> &'static str {
-        Self::NAME
+        names::ANCHOR
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -1,7 +1,10 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
-use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{
+    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
+    Variable, names,
+};
 use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -12,15 +15,10 @@ pub struct AxisWobble;
 /// No bearing lets an axis tilt further, rad (100 arcsec).
 const LARGEST: f64 = 5e-4;
 
-impl AxisWobble {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "axis_wobble";
-}
-
 impl Cause for AxisWobble {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::AXIS_WOBBLE,
             place: "joint",
             formula: "the axis tilts by sin(n q), cos(n q), n = 1, 2",
             size: "5 to 100 arcsec",
@@ -47,6 +45,17 @@ impl Cause for AxisWobble {
         let names = [["a_sin", "a_cos"], ["b_sin", "b_cos"]];
         let chosen = (0..2).filter(|k| about.is_none_or(|about| about == *k)).flat_map(|k| names[k]);
         chosen.map(|name| (name.to_string(), Unit::Radian, 0.01)).collect()
+    }
+
+    /// What a neighbour seems to do with the angle of a joint whose axis wobbles.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        let follows = |form: &&Form| match (form.term().map(Term::basis), form.term().and_then(Term::of_one)) {
+            (Some(Basis::Wave { .. }), Some((joint, Variable::Angle { joint: by }))) => {
+                by != joint && own.place == Place::Joint(by)
+            }
+            _ => false,
+        };
+        own.name == self.name() && part.name == names::UNKNOWN && part.forms.iter().all(follows)
     }
 
     fn variant(&self, term: &Term) -> String {

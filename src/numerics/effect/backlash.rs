@@ -2,7 +2,7 @@
 
 use super::basis::around;
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
 };
 use crate::criteria::effect::{BENDS, RARE};
 use crate::robot::RobotModel;
@@ -34,15 +34,10 @@ fn known(joint: usize, survey: &Survey) -> Option<f64> {
     (friction > 0.0 && friction < survey.load(joint)).then_some(friction)
 }
 
-impl Backlash {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "backlash";
-}
-
 impl Cause for Backlash {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::BACKLASH,
             place: "joint",
             formula: "d = g s, or g sign(t), or the one at small and the other at large loads",
             size: "5 to 100 arcsec",
@@ -129,7 +124,7 @@ impl Cause for Backlash {
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
         let times = |term: &Term| term.law().times.map(|factor| factor.of);
-        match summary.terms(Self::NAME).next().and_then(times) {
+        match summary.terms(names::BACKLASH).next().and_then(times) {
             Some(Variable::Load { .. }) => {
                 return format!(
                     "the compliance of {place} depends on the direction of approach: half the difference is {}",
@@ -139,7 +134,7 @@ impl Cause for Backlash {
             Some(_) => return format!("the lost motion of {place} grows, to a half-gap of {} in the end", summary.size()),
             None => {}
         }
-        let by = match summary.terms(Self::NAME).next().map(|term| term.law().first.of) {
+        let by = match summary.terms(names::BACKLASH).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {
                 let friction = figure(friction_nm.abs(), 0);
@@ -164,8 +159,8 @@ impl Cause for Backlash {
         (pushed && *p.first()? < -error(0)).then(|| "its gap is negative".into())
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["joint_hardening", "joint_compliance", "presliding", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
@@ -16,11 +16,6 @@ pub struct BasePlacement {
 }
 
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
-
-impl BaseFrame {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "base_frame";
-}
 
 impl BasePlacement {
     /// Corrections from a start; all zero there.
@@ -48,7 +43,7 @@ impl BasePlacement {
 impl Cause for BaseFrame {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "base_frame",
+            name: names::BASE_FRAME,
             place: "base",
             formula: "a rigid motion of the base",
             size: "any",
@@ -64,7 +59,7 @@ impl Cause for BaseFrame {
 
 impl Effect for BasePlacement {
     fn name(&self) -> &'static str {
-        BaseFrame::NAME
+        names::BASE_FRAME
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {

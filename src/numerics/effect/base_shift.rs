@@ -1,6 +1,6 @@
 //! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
 
-use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
+use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change, names};
 use crate::robot::RobotModel;
 
 pub struct BaseShift;
@@ -8,7 +8,7 @@ pub struct BaseShift;
 impl Cause for BaseShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "base_shift",
+            name: names::BASE_SHIFT,
             place: "base",
             formula: "the base moves at some time",
             size: "20 to 500 um",

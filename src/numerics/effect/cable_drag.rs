@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
@@ -11,7 +11,7 @@ pub struct CableDrag;
 impl Cause for CableDrag {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "cable_drag",
+            name: names::CABLE_DRAG,
             place: "joint",
             formula: "t by the angles of the joint and its neighbour",
             size: "1 to 10 % of the joint's torque",
@@ -34,7 +34,7 @@ impl Cause for CableDrag {
         }
     }
 
-    fn finer(&self) -> &'static [&'static str] {
+    fn absorbs_residual(&self) -> &'static [&'static str] {
         FINER
     }
 

@@ -1,6 +1,7 @@
 //! Causes of error: everything that the project knows of one stands in the file that implements [`Cause`], and every cause in one list.
 
 use super::*;
+use crate::criteria::words::REFINEMENT;
 
 /// What a cause is, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,8 +84,38 @@ pub trait Cause: Sync {
     }
 
     /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
-    fn finer(&self) -> &'static [&'static str] {
+    fn absorbs_residual(&self) -> &'static [&'static str] {
         &[]
+    }
+
+    /// The share of the gain of a finding of this name below which `part`, found beside it, is its finer shape.
+    fn absorbs_below(&self, own: &NamedForms, part: &NamedForms) -> Option<f64> {
+        (own.place == part.place && self.absorbs_residual().contains(&part.name)).then_some(*REFINEMENT)
+    }
+
+    /// Whether `part` is a part of the finding `own`, which has this cause's name or a form of it, whatever it gains.
+    fn has_part(&self, _own: &NamedForms, _part: &NamedForms, _survey: &Survey) -> bool {
+        false
+    }
+
+    /// The cause of fewer numbers that stands in the place of this one where it explains as well.
+    fn simpler(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether one form may stand in for two others: a free curve, or the bending of a link for the wind-up of two joints.
+    fn stands_in_for_two(&self) -> bool {
+        self.is_nameless()
+    }
+
+    /// What a finding that is made of forms of this cause is in the fitted model as a whole.
+    fn in_the_model(&self, _fitted: &FittedForms) -> Option<ModelledFinding> {
+        None
+    }
+
+    /// How large a form that was not found may be where geometry takes up most of what it does.
+    fn hidden(&self, _form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
+        None
     }
 
     /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
@@ -167,8 +198,8 @@ pub const CAUSES: &[&dyn Cause] = &[
     &tracker_offset::TrackerOffset,
     &tracker_refraction::TrackerRefraction,
     &joint_log_lag::JointLogLag,
-    &wrong_point::Outlier,
-    &wrong_point::MislabelledPoint,
+    &wrong_point::OUTLIER,
+    &wrong_point::MISLABELLED_POINT,
     &unknown::Unknown,
 ];
 

@@ -3,18 +3,14 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
 
 pub struct Counterbalance;
-
-impl Counterbalance {
-    pub const NAME: &'static str = "counterbalance";
-}
 
 impl Cause for Counterbalance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::COUNTERBALANCE,
             place: "joint 2 or 3",
             formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
             size: "10 to 60 % of the gravity torque",
@@ -31,7 +27,7 @@ impl Cause for Counterbalance {
         format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
+    fn absorbs_residual(&self) -> &'static [&'static str] {
         FINER
     }
 

@@ -4,7 +4,7 @@
 
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Hypothesis, Law, Motion, NumberSpec, ParameterSpec,
-    Place, Summary, Survey, Term, Variable, figure,
+    Place, Summary, Survey, Term, Variable, figure, names,
 };
 use crate::criteria::effect::RARER;
 use crate::robot::{Measurements, RobotModel};
@@ -15,7 +15,7 @@ pub struct CouplingRatio;
 impl Cause for CouplingRatio {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "coupling_ratio",
+            name: names::COUPLING_RATIO,
             place: "joint A->B",
             formula: "d of B = c q of A",
             size: "1e-5 to 1e-2",

@@ -1,11 +1,10 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::joint_compliance::JointCompliance;
-use super::joint_table::{JointTable, strongest_orders};
+use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
     Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable, orders,
+    Variable, names, orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
 use crate::robot::RobotModel;
@@ -20,9 +19,6 @@ const ORDERS: u32 = 48;
 const LOW: u32 = 4;
 
 impl GearCyclic {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "gear_cyclic";
-
     /// The error of one order per turn of a joint; with its overtone, twice the order, as an eccentric wheel or disc has it.
     pub fn term(joint: usize, order: u32, overtone: bool) -> Term {
         Term::new(&Self, Motion::Joint { joint }, Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone }))
@@ -32,7 +28,7 @@ impl GearCyclic {
 impl Cause for GearCyclic {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::GEAR_CYCLIC,
             place: "joint",
             formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",
             size: "5 to 100 arcsec",
@@ -68,10 +64,11 @@ impl Cause for GearCyclic {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let mut orders: Vec<String> = summary.estimates(Self::NAME).map(|(term, numbers)| order(term, &numbers)).collect();
-        let weight = summary.words(JointCompliance::NAME);
+        let mut orders: Vec<String> =
+            summary.estimates(names::GEAR_CYCLIC).map(|(term, numbers)| order(term, &numbers)).collect();
+        let weight = summary.words(names::JOINT_COMPLIANCE);
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
-        orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
+        orders.extend(summary.estimates(names::JOINT_TABLE).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
     }
 
@@ -79,13 +76,13 @@ impl Cause for GearCyclic {
         Some(orders::LARGE)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 
     fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
         let first = matches!(term.basis(), Basis::Wave { order: 1, .. });
-        if first { vec![("counterbalance", term.motion().place())] } else { Vec::new() }
+        if first { vec![(names::COUNTERBALANCE, term.motion().place())] } else { Vec::new() }
     }
 }
 

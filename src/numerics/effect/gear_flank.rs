@@ -1,6 +1,8 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
-use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -54,8 +56,8 @@ impl Cause for GearFlank {
         format!("the two flanks of the teeth of {} err differently: {} to either side", summary.place, orders)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["backlash", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::BACKLASH, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -1,6 +1,8 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
+};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -51,8 +53,8 @@ impl Cause for GearLoad {
         format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "joint_compliance", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

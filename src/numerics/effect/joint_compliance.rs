@@ -6,7 +6,7 @@
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
-    Place, Placed, Summary, Survey, Variable,
+    Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -14,15 +14,10 @@ use serde::{Deserialize, Serialize};
 /// Wind-up of joints by their load.
 pub struct JointCompliance;
 
-impl JointCompliance {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_compliance";
-}
-
 impl Cause for JointCompliance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_compliance",
+            name: names::JOINT_COMPLIANCE,
             place: "joint",
             formula: "d = c t",
             size: "0.1 to 10 urad/Nm",
@@ -48,12 +43,12 @@ impl Cause for JointCompliance {
 
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
-        let Some(largest) = summary.words(Self::NAME) else {
+        let Some(largest) = summary.words(names::JOINT_COMPLIANCE) else {
             return format!("{place} winds up under its load by {}", summary.value());
         };
         let weight = format!("by up to {largest} arcsec where its links stretch out level");
         // By a stiffness of its own.
-        match summary.wordless(Self::NAME).first() {
+        match summary.wordless(names::JOINT_COMPLIANCE).first() {
             Some(own) => format!(
                 "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
                 own.value, own.unit
@@ -65,8 +60,8 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
@@ -167,7 +162,7 @@ impl Windups {
 
 impl Effect for Windups {
     fn name(&self) -> &'static str {
-        JointCompliance::NAME
+        names::JOINT_COMPLIANCE
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

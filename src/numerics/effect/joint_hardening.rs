@@ -2,8 +2,8 @@
 
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Backlash, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, ParameterEstimate, Place,
-    Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
+    Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -13,11 +13,6 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Wind-up that is not in proportion to the load.
 pub struct JointHardening;
-
-impl JointHardening {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_hardening";
-}
 
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,7 +52,7 @@ const FLAT: f64 = 0.1;
 impl Cause for JointHardening {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_hardening",
+            name: names::JOINT_HARDENING,
             place: "joint",
             formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
             size: "5 to 50 % of the wind-up",
@@ -87,12 +82,21 @@ impl Cause for JointHardening {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let shape = summary.words(Self::NAME).unwrap_or_else(|| "its shape is a free curve of the load".into());
+        let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["backlash", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::BACKLASH, names::UNKNOWN]
+    }
+
+    /// A joint has one wind-up.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
+    }
+
+    fn simpler(&self) -> Option<&'static str> {
+        Some(names::JOINT_COMPLIANCE)
     }
 
     /// From a wind-up in proportion.
@@ -229,7 +233,7 @@ impl Placed for BentWindup {
     }
 
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        if self.is_lost_motion(p, survey.load(self.joint)) { Backlash::NAME } else { JointHardening::NAME }
+        if self.is_lost_motion(p, survey.load(self.joint)) { names::BACKLASH } else { names::JOINT_HARDENING }
     }
 
     fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
@@ -243,7 +247,7 @@ impl Placed for BentWindup {
     }
 
     fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
-        if called == Backlash::NAME { vec![(JointHardening::NAME, self.place())] } else { Vec::new() }
+        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, self.place())] } else { Vec::new() }
     }
 
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {

@@ -2,19 +2,16 @@
 //! joints were logged, or, where a controller ends the moves of all joints together, a turn shared out as these moves are; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary,
+    Survey, Variable, figure, names,
 };
+use crate::criteria::words::{CLOCKS, TRACE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
 /// Joints logged before or after the point was measured.
 pub struct JointLogLag;
-
-impl JointLogLag {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_log_lag";
-}
 
 /// What the lag is in proportion to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,7 +40,7 @@ const LARGEST: f64 = 0.3;
 impl Cause for JointLogLag {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_log_lag",
+            name: names::JOINT_LOG_LAG,
             place: "recording",
             formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
             size: "0.1 to 5 % of the move; 0.5 to 20 ms",
@@ -62,7 +59,7 @@ impl Cause for JointLogLag {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let clocks = summary.variables(Self::NAME).contains(&Variable::Speed);
+        let clocks = summary.variables(names::JOINT_LOG_LAG).contains(&Variable::Speed);
         match summary.parameters.first() {
             Some(n) if clocks => {
                 let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
@@ -93,6 +90,16 @@ impl Cause for JointLogLag {
             }
             None => "joints and points do not belong to the same moment".to_string(),
         }
+    }
+
+    /// A backlash follows the side of the last move, too.
+    fn absorbs_below(&self, _own: &NamedForms, part: &NamedForms) -> Option<f64> {
+        (part.name == names::BACKLASH).then_some(*TRACE)
+    }
+
+    fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
+        let clocks = form.variables() == [Variable::Speed];
+        clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -1,6 +1,6 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -10,7 +10,7 @@ pub struct JointOffset;
 impl Cause for JointOffset {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "joint_offset",
+            name: names::JOINT_OFFSET,
             place: "joint",
             formula: "d = c",
             size: "0.1 to 5 mrad",
@@ -26,7 +26,7 @@ impl Cause for JointOffset {
 
 impl Effect for JointOffset {
     fn name(&self) -> &'static str {
-        "joint_offset"
+        names::JOINT_OFFSET
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

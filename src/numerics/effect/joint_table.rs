@@ -1,7 +1,8 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
 use super::{
-    Basis, Cause, CauseDescription, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
+    Basis, Cause, CauseDescription, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term,
+    Variable, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -26,15 +27,14 @@ pub(super) const PLAUSIBLE: f64 = 3e-4;
 /// Cosines of a curve up to this one make at most two periods over its range.
 const SMOOTH: usize = 4;
 
-impl JointTable {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "joint_table";
-}
-
 impl Cause for JointTable {
+    fn stands_in_for_two(&self) -> bool {
+        true
+    }
+
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::JOINT_TABLE,
             place: "joint",
             formula: "d = a smooth curve of q over the measured range",
             size: "5 to 200 arcsec",
@@ -70,15 +70,15 @@ impl Cause for JointTable {
     /// With most of its variance in waves of more than two periods over its range: a gear or an encoder.
     fn called(&self, _term: &Term, p: &[f64], _survey: &Survey) -> &'static str {
         let square = |some: &[f64]| some.iter().map(|c| c * c).sum::<f64>();
-        if 2.0 * square(&p[SMOOTH.min(p.len())..]) > square(p) { "gear_cyclic" } else { Self::NAME }
+        if 2.0 * square(&p[SMOOTH.min(p.len())..]) > square(p) { names::GEAR_CYCLIC } else { names::JOINT_TABLE }
     }
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} has a repeatable error of no simple form, kept as a table", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 }
 

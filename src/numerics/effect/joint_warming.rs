@@ -1,7 +1,8 @@
 //! `joint_warming`: a joint's zero, ratio or stiffness follows a temperature, the warm-up, or the heat of the joint's own work.
 
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, warmth,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
+    warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
@@ -13,10 +14,6 @@ pub struct JointWarming;
 const COOLINGS: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 /// What of a joint follows.
 const KINDS: usize = 3;
-
-impl JointWarming {
-    pub const NAME: &'static str = "joint_warming";
-}
 
 /// Heat of the joint's own work, 1 at its most.
 fn work(joint: usize, survey: &Survey) -> Vec<(Law, usize)> {
@@ -35,7 +32,7 @@ fn work(joint: usize, survey: &Survey) -> Vec<(Law, usize)> {
 impl Cause for JointWarming {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::JOINT_WARMING,
             place: "joint",
             formula: "d = w, w q or w t, w: temperature above the first, warm-up, or recent work",
             size: "1 to 50 arcsec",
@@ -94,7 +91,7 @@ impl Cause for JointWarming {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let each = summary.estimates(Self::NAME).map(|(term, numbers)| {
+        let each = summary.estimates(names::JOINT_WARMING).map(|(term, numbers)| {
             let size = |scale: f64, decimals| numbers.first().map_or_else(String::new, |n| figure(scale * n.value, decimals));
             let what = match term.law().times.map(|factor| factor.of) {
                 None => format!("its zero by {} arcsec", size(1.0, 0)),
@@ -115,8 +112,8 @@ impl Cause for JointWarming {
         format!("{} changes with warmth: {}", summary.place, each.collect::<Vec<_>>().join(", "))
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -2,7 +2,7 @@
 
 use super::motion::{SHORT, extent};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
@@ -13,11 +13,6 @@ use serde::{Deserialize, Serialize};
 
 /// Links that bend under the moment at their far joint.
 pub struct LinkCompliance;
-
-impl LinkCompliance {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "link_compliance";
-}
 
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,7 +39,7 @@ const WRIST: usize = 2;
 impl Cause for LinkCompliance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_compliance",
+            name: names::LINK_COMPLIANCE,
             place: "link",
             formula: "the link bends about its far joint, by the moment there",
             size: "0.05 to 1 urad/Nm",
@@ -65,6 +60,10 @@ impl Cause for LinkCompliance {
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
             .collect()
+    }
+
+    fn stands_in_for_two(&self) -> bool {
+        true
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -3,7 +3,7 @@
 //! Two displacements and two tilts perpendicular to the axis of joint N+1, about its point; together with `base_frame`,
 //! `joint_offset` and `tool_offset` this is complete (rank 4R + 2P + 3) and free of the singularity of parallel axes.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -21,7 +21,7 @@ fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, b
 impl Cause for LinkGeometry {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_geometry",
+            name: names::LINK_GEOMETRY,
             place: "link",
             formula: "lengths and tilts between two axes",
             size: "0.1 to 1 mm, 0.1 to 1 mrad",
@@ -37,7 +37,7 @@ impl Cause for LinkGeometry {
 
 impl Effect for LinkGeometry {
     fn name(&self) -> &'static str {
-        "link_geometry"
+        names::LINK_GEOMETRY
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

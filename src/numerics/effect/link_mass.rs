@@ -3,7 +3,7 @@
 use super::spring::{MEASURE, Spring};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable,
+    Variable, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -24,7 +24,7 @@ pub struct WrongLinkMass {
 impl Cause for LinkMass {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "link_mass",
+            name: names::LINK_MASS,
             place: "link",
             formula: "mass and first moments of a link in the torque model",
             size: "3 to 20 %",
@@ -99,7 +99,7 @@ impl Placed for WrongLinkMass {
     }
 
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
-        if Spring::balances(self.link) { vec![("counterbalance", Place::Joint(self.link))] } else { Vec::new() }
+        if Spring::balances(self.link) { vec![(names::COUNTERBALANCE, Place::Joint(self.link))] } else { Vec::new() }
     }
 
     fn is_of_torque_model(&self) -> bool {

@@ -3,7 +3,7 @@
 use super::spring::MEASURE;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, figure,
+    Variable, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -28,7 +28,7 @@ const TOOL: f64 = 5.0;
 impl Cause for PayloadError {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "payload_error",
+            name: names::PAYLOAD_ERROR,
             place: "tool",
             formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
             size: "3 to 30 %",

@@ -1,7 +1,9 @@
 //! `presliding`: lost motion that fades in over a travel after each reversal, as friction does before surfaces slide (Dahl).
 
 use super::basis::around;
-use super::{Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
+use super::{
+    Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -23,7 +25,7 @@ impl Presliding {
 impl Cause for Presliding {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "presliding",
+            name: names::PRESLIDING,
             place: "joint",
             formula: "d = c z, z -> s + (z - s) exp(-|dq| / travel) from row to row",
             size: "5 to 60 arcsec over 0.5 to 10 deg",
@@ -61,8 +63,8 @@ impl Cause for Presliding {
         format!("lost motion of {} fades in after each reversal{over}: {} to either side", summary.place, summary.size())
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["backlash", "joint_log_lag", "unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

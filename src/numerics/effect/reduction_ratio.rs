@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,15 +11,10 @@ use crate::units::Unit;
 #[derive(Debug, Clone, Copy)]
 pub struct ReductionRatio;
 
-impl ReductionRatio {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "reduction_ratio";
-}
-
 impl Cause for ReductionRatio {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "reduction_ratio",
+            name: names::REDUCTION_RATIO,
             place: "joint",
             formula: "d = c q",
             size: "1e-5 to 1e-3",
@@ -35,7 +30,7 @@ impl Cause for ReductionRatio {
 
 impl Effect for ReductionRatio {
     fn name(&self) -> &'static str {
-        Self::NAME
+        names::REDUCTION_RATIO
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

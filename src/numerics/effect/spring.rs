@@ -3,7 +3,7 @@
 //!
 //! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
 
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -16,7 +16,7 @@ pub(super) const MEASURE: Measure = Measure {
 };
 
 /// What its own shape may leave at the same joint.
-pub(super) const FINER: &[&str] = &["gear_cyclic", "unknown", "joint_table", "backlash"];
+pub(super) const FINER: &[&str] = &[names::GEAR_CYCLIC, names::UNKNOWN, names::JOINT_TABLE, names::BACKLASH];
 
 /// Under the name of a cause.
 #[derive(Clone)]
@@ -98,8 +98,8 @@ impl Placed for Spring {
     /// The torque of a link about its own joint is of first order in that joint's angle.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
         let (joint, place) = (self.shape.joint, self.place());
-        let balancer = (self.cause.name() == "counterbalance").then_some(("cable_drag", place));
-        balancer.into_iter().chain([("gear_cyclic", place), ("link_mass", Place::Links(joint, joint))]).collect()
+        let balancer = (self.cause.name() == names::COUNTERBALANCE).then_some((names::CABLE_DRAG, place));
+        balancer.into_iter().chain([(names::GEAR_CYCLIC, place), (names::LINK_MASS, Place::Links(joint, joint))]).collect()
     }
 
     fn is_of_torque_model(&self) -> bool {

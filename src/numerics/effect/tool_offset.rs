@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about its seat.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -20,19 +20,16 @@ fn width(target: &Target) -> usize {
 }
 
 impl ToolOffset {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "tool_offset";
-
     /// What the names of a target's parameters begin with, dot included.
     pub fn prefix(target: &str) -> String {
-        if target.is_empty() { format!("{}.", Self::NAME) } else { format!("{}.{target}.", Self::NAME) }
+        if target.is_empty() { format!("{}.", names::TOOL_OFFSET) } else { format!("{}.{target}.", names::TOOL_OFFSET) }
     }
 }
 
 impl Cause for ToolOffset {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "tool_offset",
+            name: names::TOOL_OFFSET,
             place: "tool",
             formula: "a displacement of the measured point",
             size: "any",
@@ -48,7 +45,7 @@ impl Cause for ToolOffset {
 
 impl Effect for ToolOffset {
     fn name(&self) -> &'static str {
-        Self::NAME
+        names::TOOL_OFFSET
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -1,20 +1,18 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
-use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
+use super::{
+    Axes, Cause, CauseDescription, FittedForms, Hypothesis, Measure, ModelledFinding, Motion, NamedForms, NumberSpec, Place,
+    Summary, Survey, Term, change, holder, names,
+};
 use crate::robot::RobotModel;
 
 /// A target that moves at some time.
 pub struct ToolShift;
 
-impl ToolShift {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "tool_shift";
-}
-
 impl Cause for ToolShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::TOOL_SHIFT,
             place: "tool",
             formula: "the target moves at some time",
             size: "20 to 500 um",
@@ -37,6 +35,18 @@ impl Cause for ToolShift {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the target on the tool has moved{}", summary.when(self.name()))
+    }
+
+    /// One target on the last body that turns about its axis is one step, though the last joint's zero takes a part of it.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, survey: &Survey) -> bool {
+        let last = (names::ZERO_SHIFT, Place::Joint(survey.joints() - 1));
+        (own.name, own.place) == (self.name(), Place::Tool)
+            && (part.name, part.place) == last
+            && holder::step_together(own, part, survey)
+    }
+
+    fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {
+        holder::turned(fitted)
     }
 
     fn measure(&self) -> Option<Measure> {

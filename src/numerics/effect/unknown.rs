@@ -9,11 +9,12 @@ use super::motion::{SHORT, extent};
 use super::orders;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term, Variable,
-    warmth,
+    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NamedForms, NumberSpec, Place, Polar, Summary, Survey,
+    Term, Variable, names, warmth,
 };
 use super::{frames, interactions};
 use crate::criteria::effect::{HARDLY_EVER, LOW_ORDERS, OPEN, RARE, RARER, UNCOMMON};
+use crate::criteria::words::SLOW;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use words::in_words;
@@ -43,9 +44,6 @@ const WIDE: f64 = 0.01;
 const PER_LOAD: f64 = 1e-4;
 
 impl Unknown {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "unknown";
-
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         let unweighed = is_unweighed(survey.robot);
@@ -108,7 +106,7 @@ impl Unknown {
 impl Cause for Unknown {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::UNKNOWN,
             place: "joint, link, base, tool or tracker",
             formula: "a form-free function of joints, time, payload or sight",
             size: "any",
@@ -293,7 +291,7 @@ impl Cause for Unknown {
 
     /// A joint that follows a function of its own angle and a neighbour's: a hose runs along both and pulls.
     fn called(&self, term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
-        if is_hose(term) { "cable_drag" } else { Self::NAME }
+        if is_hose(term) { names::CABLE_DRAG } else { names::UNKNOWN }
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -305,8 +303,22 @@ impl Cause for Unknown {
         true
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "joint_table"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::GEAR_CYCLIC, names::JOINT_TABLE]
+    }
+
+    /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
+    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
+        let angles = own.forms.iter().find_map(|form| form.term()?.two_angles());
+        let (Some(angles), Place::Joint(joint)) = (angles, own.place) else { return false };
+        let is_part = |form: &&Form| match (form.place(), form.term().map(Term::basis)) {
+            (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
+            (at, Some(Basis::Wave { order, .. })) if form.name() == names::GEAR_CYCLIC => {
+                at == Place::Joint(joint) && angles.contains(&joint) && order <= *SLOW
+            }
+            _ => false,
+        };
+        part.forms.iter().all(is_part)
     }
 
     fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
@@ -314,11 +326,11 @@ impl Cause for Unknown {
         let joint = matches!(place, Place::Joint(_));
         match (term.basis(), term.law().first.of) {
             (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
-                vec![("axis_wobble", Place::Joint(by))]
+                vec![(names::AXIS_WOBBLE, Place::Joint(by))]
             }
             // No motor current tells of a pull.
-            _ if called == "cable_drag" => vec![(Self::NAME, place)],
-            _ if joint && term.two_angles().is_some() => vec![("cable_drag", place)],
+            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
+            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
             _ => Vec::new(),
         }
     }
@@ -342,7 +354,7 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
 
 /// What a finding's law without a name is a function of and how, in words; none where it has no such law.
 pub(super) fn described(summary: &Summary) -> Option<String> {
-    let (term, numbers) = summary.estimates(Unknown::NAME).next()?;
+    let (term, numbers) = summary.estimates(names::UNKNOWN).next()?;
     // A joint that slides errs by a length.
     let slides = matches!(term.motion(), Motion::Joint { .. }) && numbers.first().is_some_and(|number| number.unit == "mm");
     Some(in_words(term, slides, summary.clock))

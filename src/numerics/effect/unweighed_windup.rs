@@ -3,10 +3,9 @@
 //!
 //! Bodies are those from the joint outwards, their moments base parameters: two a joint that turns. Bodies that slide are left out.
 
-use super::counterbalance::Counterbalance;
 use super::skeleton::moments;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed, Survey, Variable, figure,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed, Survey, Variable, figure, names,
 };
 use crate::robot::{Measurements, Posture, RobotModel};
 use crate::units::Unit;
@@ -219,15 +218,15 @@ impl Placed for UnweighedWindup {
         let (outwards, across) = (sum(true), sum(false));
         let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
         match self.shape.own_angle {
-            true if has(false) && across > PHASE * outwards => "gear_cyclic",
-            _ if has(true) && outwards < 0.0 => "cable_drag",
+            true if has(false) && across > PHASE * outwards => names::GEAR_CYCLIC,
+            _ if has(true) && outwards < 0.0 => names::CABLE_DRAG,
             _ => self.cause.name(),
         }
     }
 
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
-        let names = ["gear_cyclic", Counterbalance::NAME].into_iter().filter(|_| self.shape.own_angle);
+        let names = [names::GEAR_CYCLIC, names::COUNTERBALANCE].into_iter().filter(|_| self.shape.own_angle);
         names.map(|name| (name, self.place())).collect()
     }
 

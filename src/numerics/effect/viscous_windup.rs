@@ -2,7 +2,10 @@
 //!
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
-use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
+use super::{
+    Basis, Cause, CauseDescription, Form, HiddenSize, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term,
+    Variable, figure, names,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,16 +14,13 @@ pub struct ViscousWindup;
 
 /// s: a joint that trails farther is not driven.
 const LARGEST: f64 = 0.1;
-
-impl ViscousWindup {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "viscous_windup";
-}
+/// s: a joint that trails by less (5 arcsec for each deg/s) is no cause to measure again.
+const TRAIL: f64 = 5.0 / 3600.0;
 
 impl Cause for ViscousWindup {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::VISCOUS_WINDUP,
             place: "joint",
             formula: "d = -c dq/dt: the joint trails in proportion to its speed",
             size: "0.2 to 10 arcsec for each deg/s",
@@ -49,7 +49,13 @@ impl Cause for ViscousWindup {
         format!("{} trails behind in proportion to its speed, by {trail}", summary.place)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["backlash", "gear_cyclic", "unknown"]
+    fn hidden(&self, form: &Form, robot: &RobotModel) -> Option<HiddenSize> {
+        let turns = matches!(form.place(), Place::Joint(joint) if robot.is_revolute(joint));
+        let unit = Unit::ArcsecondPerDegreePerSecond;
+        turns.then_some(HiddenSize { subject: None, may: "may trail", least: TRAIL, unit })
+    }
+
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN]
     }
 }

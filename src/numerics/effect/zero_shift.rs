@@ -1,20 +1,18 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
-use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
+use super::{
+    Cause, CauseDescription, FittedForms, Hypothesis, Measure, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term,
+    change, holder, names,
+};
 use crate::robot::RobotModel;
 
 /// A joint zero that steps at some time.
 pub struct ZeroShift;
 
-impl ZeroShift {
-    /// Canonical name, as in tables and YAML.
-    pub const NAME: &'static str = "zero_shift";
-}
-
 impl Cause for ZeroShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: names::ZERO_SHIFT,
             place: "joint",
             formula: "d = c after some time",
             size: "10 to 500 arcsec",
@@ -41,7 +39,11 @@ impl Cause for ZeroShift {
     }
 
     fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
-        if term.motion().place() == Place::Joint(0) { vec![("base_shift", Place::Base)] } else { Vec::new() }
+        if term.motion().place() == Place::Joint(0) { vec![(names::BASE_SHIFT, Place::Base)] } else { Vec::new() }
+    }
+
+    fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {
+        holder::turned(fitted)
     }
 
     fn measure(&self) -> Option<Measure> {

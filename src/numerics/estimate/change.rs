@@ -7,7 +7,7 @@
 use super::factor::TriangularFactor;
 use super::problem::Problem;
 use super::session::Session;
-use crate::effect::BaseFrame;
+use crate::effect::names;
 use faer::Mat;
 
 /// A parameter's step from one recording to the other, SI.
@@ -37,7 +37,7 @@ const TIE: f64 = 0.99;
 /// Tests every parameter but the base's, in order of precedence; both models have the same parameters.
 pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<ParameterChange> {
     let stack = &before.model.stack;
-    let base: Vec<usize> = stack.parameters_of(BaseFrame::NAME).collect();
+    let base: Vec<usize> = stack.parameters_of(names::BASE_FRAME).collect();
     let shared: Vec<usize> = (0..stack.specs().len()).filter(|k| !base.contains(k)).collect();
     let mut reduced = Reduced::of(before, after, &shared, &base);
     let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;

@@ -7,7 +7,7 @@ use super::levenberg::{FINE, minimise};
 use super::model::Model;
 use super::problem::Problem;
 use super::session::Session;
-use crate::effect::AnchorShift;
+use crate::effect::names;
 use crate::observation::kinds;
 use crate::robot::Measurements;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +33,7 @@ fn unseen(model: &Model, data: &Measurements, rows: &[usize], others: &[usize]) 
 /// The parameters of anchors by their numbers, in the stack.
 fn parameters<'a>(model: &Model, anchors: impl Iterator<Item = &'a usize>) -> Vec<usize> {
     let setup = model.robot.setup();
-    let Some(first) = model.stack.parameters_of(AnchorShift::NAME).next() else { return Vec::new() };
+    let Some(first) = model.stack.parameters_of(names::ANCHOR).next() else { return Vec::new() };
     let of = |number: &usize| {
         let begin = first + setup.first_of_anchor(*number);
         begin..begin + setup.anchors[*number].shape.parameters()

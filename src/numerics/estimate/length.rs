@@ -2,7 +2,7 @@
 
 use super::known::KnownLength;
 use super::model::Model;
-use crate::effect::AnchorShift;
+use crate::effect::names;
 use crate::robot::{Anchor, Shape};
 use nalgebra::Vector3;
 
@@ -44,7 +44,7 @@ impl Model {
     pub(super) fn standing_anchor(&self, number: usize) -> Option<StandingAnchor<'_>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(number)?;
-        let range = self.stack.effects().find(|(effect, _)| effect.name() == AnchorShift::NAME)?.1;
+        let range = self.stack.effects().find(|(effect, _)| effect.name() == names::ANCHOR)?.1;
         let first = range.start + setup.first_of_anchor(number);
         let x = &self.x[first..first + anchor.shape.parameters()];
         Some(match anchor.shape {

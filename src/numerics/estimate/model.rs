@@ -1,7 +1,7 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
 use super::known::{Known, KnownLength};
-use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, PlacementBuffers};
+use crate::effect::{BasePlacement, EffectStack, PlacedRow, PlacementBuffers, names};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -35,7 +35,7 @@ impl Model {
     pub fn base(&self) -> Pose {
         self.stack
             .effects()
-            .find(|(effect, _)| effect.name() == BaseFrame::NAME)
+            .find(|(effect, _)| effect.name() == names::BASE_FRAME)
             .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
     }
 

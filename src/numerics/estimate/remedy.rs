@@ -8,7 +8,7 @@ use super::fit::{Fitted, ParameterStatus};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
-use crate::effect::ToolOffset;
+use crate::effect::names;
 use crate::robot::{Measurements, PointReadings, RobotModel};
 use faer::Mat;
 use nalgebra::Vector3;
@@ -62,7 +62,7 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
     let target = at(&beside(model), &poses(model, data, rows, &[usual]));
     let specs = model.stack.specs();
-    let of_tool: Vec<usize> = model.stack.parameters_of(ToolOffset::NAME).collect();
+    let of_tool: Vec<usize> = model.stack.parameters_of(names::TOOL_OFFSET).collect();
     let tool: Vec<bool> = candidates.iter().map(|k| of_tool.contains(k)).collect();
     let prior: Vec<f64> = candidates.iter().map(|k| specs[*k].prior_sigma).collect();
     let none = vec![false; candidates.len()];

@@ -2,7 +2,7 @@
 
 use super::covariance::Covariance;
 use super::model::Model;
-use crate::effect::{AnchorShift, ToolOffset};
+use crate::effect::names;
 use crate::observation::only_brought;
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -33,7 +33,7 @@ pub struct ArmScale {
 pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
-    let linked = model.stack.parameters_of("link_geometry").any(|k| free.contains(&k));
+    let linked = model.stack.parameters_of(names::LINK_GEOMETRY).any(|k| free.contains(&k));
     if rows.is_empty() || !linked || !only_brought(data, rows) {
         return None;
     }
@@ -42,7 +42,7 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         rows.iter().map(|row| model.stack.point(&model.robot, data, *row, &model.x, &mut scratch)).collect();
     let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let square: f64 = points.iter().map(|point| (point - middle).norm_squared()).sum();
-    let links: Vec<usize> = model.stack.parameters_of("link_geometry").collect();
+    let links: Vec<usize> = model.stack.parameters_of(names::LINK_GEOMETRY).collect();
     let beyond = covariance.map_or(1.0, |covariance| beyond_priors(model, covariance));
     let sigmas = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
         let mut along = vec![0.0; model.x.len()];
@@ -78,7 +78,7 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         by_length: !model.lengths.is_empty()
             || known_places(model) > 1
             || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
-        by_priors: told("link_geometry") || told(ToolOffset::NAME),
+        by_priors: told(names::LINK_GEOMETRY) || told(names::TOOL_OFFSET),
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })
 }
@@ -100,14 +100,14 @@ const ALONG: f64 = 0.999;
 pub fn known_places(model: &Model) -> usize {
     let specs = model.stack.specs();
     let told = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
-    model.stack.parameters_of(AnchorShift::NAME).filter(told).count()
+    model.stack.parameters_of(names::ANCHOR).filter(told).count()
 }
 
 /// Root of the squares of links' deviations from their priors, in standard deviations, over the number of directions that the data see of
 /// them (the ratio of Birge; effective parameters after MacKay, 1992); at least 1.
 fn beyond_priors(model: &Model, covariance: &Covariance) -> f64 {
     let (mut square, mut seen) = (0.0, 0.0);
-    let links: Vec<usize> = model.stack.parameters_of("link_geometry").collect();
+    let links: Vec<usize> = model.stack.parameters_of(names::LINK_GEOMETRY).collect();
     for (row, k) in covariance.parameters().iter().enumerate().filter(|(_, k)| links.contains(k)) {
         if let Some(prior) = model.known(*k).prior {
             square += ((model.x[*k] - prior.mean) / prior.sigma).powi(2);

@@ -1,7 +1,7 @@
 //! Parameters as people know them: where base, targets and anchors stand, and of all others the change from nominal.
 
 use super::model::Model;
-use crate::effect::{AnchorShift, BaseFrame, ToolOffset};
+use crate::effect::names;
 use crate::robot::{Anchor, Shape, Target};
 use crate::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -14,9 +14,9 @@ impl Model {
         let Some((effect, range)) = found else { return change };
         let number = parameter - range.start;
         match effect.name() {
-            BaseFrame::NAME => (component(self.stack.base(), number), component(&self.base(), number)),
-            AnchorShift::NAME => self.anchored(number).unwrap_or(change),
-            ToolOffset::NAME => self.seat(number, &self.x[range]).unwrap_or(change),
+            names::BASE_FRAME => (component(self.stack.base(), number), component(&self.base(), number)),
+            names::ANCHOR => self.anchored(number).unwrap_or(change),
+            names::TOOL_OFFSET => self.seat(number, &self.x[range]).unwrap_or(change),
             _ => change,
         }
     }

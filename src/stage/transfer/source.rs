@@ -1,7 +1,7 @@
 //! Where a carried model comes from: the rows it was fitted to, and the geometry that was identified by itself from the same recording.
 
 use super::{TransferReads, is_geometry};
-use crate::effect::{BaseFrame, Load, ToolOffset};
+use crate::effect::{Load, names};
 use crate::error::Result;
 use crate::estimate::{FitOptions, fit};
 use crate::robot::RobotModel;
@@ -33,7 +33,7 @@ impl<'a> CarriedFrom<'a> {
     /// same rows without what else was found.
     pub fn geometry(&self, reads: &TransferReads, load: Load) -> Result<Parameters> {
         let of_the_arm =
-            |row: &ParameterRow| row.status == "free" && ![BaseFrame::NAME, ToolOffset::NAME].contains(&row.effect.as_str());
+            |row: &ParameterRow| row.status == "free" && ![names::BASE_FRAME, names::TOOL_OFFSET].contains(&row.effect.as_str());
         let alone = |parameters: &Parameters| parameters.0.iter().all(is_geometry) && parameters.0.iter().any(of_the_arm);
         let here = |stage: &str| CarriedFrom::of_stage(reads, stage).is_some_and(|one| one.recording == self.recording);
         let identified =

@@ -24,9 +24,6 @@ impl Act for BaseCompliance {
         let about = matrix::times(&matrix::turn_by(tilt), &matrix::shift(matrix::scale(pivot, -1.0)));
         motion.base = matrix::times(&motion.base, &matrix::times(&matrix::shift(pivot), &about));
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.rad_per_nm = self.rad_per_nm.map(|soft| soft * by);
     }

@@ -27,9 +27,6 @@ impl Act for BaseShift {
             motion.base = matrix::times(&by, &motion.base);
         }
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.shift_um = matrix::scale(self.shift_um, by);
         self.turn_arcsec = matrix::scale(self.turn_arcsec, by);

@@ -29,9 +29,6 @@ impl Act for BaseSway {
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.base = matrix::times(&by, &motion.base);
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.shift_um = matrix::scale(self.shift_um, by);
         self.turn_arcsec = matrix::scale(self.turn_arcsec, by);

@@ -138,7 +138,9 @@ trait Act {
         self.later() != 0.0
     }
     /// The joint or link that it sits on, from 1, where it has one.
-    fn seat(&self) -> Option<usize>;
+    fn seat(&self) -> Option<usize> {
+        None
+    }
     /// Multiplies the size of what it does.
     fn scale(&mut self, by: f64);
     /// Its true numbers in canonical names.

@@ -24,9 +24,6 @@ impl Act for PayloadError {
         arm.payload_share *= 1.0 + self.mass_share;
         arm.payload_centre = matrix::add(arm.payload_centre, matrix::scale(self.centre_mm, 1e-3));
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.mass_share *= by;
         self.centre_mm = matrix::scale(self.centre_mm, by);

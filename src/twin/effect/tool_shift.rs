@@ -21,9 +21,6 @@ impl Act for ToolShift {
             motion.tool = matrix::add(motion.tool, matrix::scale(self.shift_um, 1e-6));
         }
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.shift_um = matrix::scale(self.shift_um, by);
     }

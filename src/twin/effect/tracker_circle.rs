@@ -48,9 +48,6 @@ impl Act for TrackerCircle {
         };
         Polar { azimuth, ..seen }.point()
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.amplitude_arcsec *= by;
     }

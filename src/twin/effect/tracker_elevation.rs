@@ -33,9 +33,6 @@ impl Act for TrackerElevation {
         let azimuth = seen.azimuth + ARCSEC * self.transit_arcsec * seen.elevation.tan();
         Polar { azimuth, elevation, ..seen }.point()
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         for size in [&mut self.index_arcsec, &mut self.sag_arcsec, &mut self.circle_arcsec, &mut self.transit_arcsec] {
             *size *= by;

@@ -38,9 +38,6 @@ impl Act for TrackerOffset {
         let off = self.constant_um + self.cyclic_um * cycle + self.um_per_m2 * seen.range * seen.range;
         Polar { range: seen.range + 1e-6 * off, ..seen }.point()
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.constant_um *= by;
         self.cyclic_um *= by;

@@ -43,9 +43,6 @@ impl Act for TrackerRefraction {
     fn sight(&self, _row: &Row, memory: f64, point: Vector) -> Vector {
         matrix::scale(point, 1.0 + 1e-6 * self.um_per_m_k * memory)
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.um_per_m_k *= by;
     }

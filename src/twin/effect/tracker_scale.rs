@@ -18,9 +18,6 @@ impl Act for TrackerScale {
             row.iter_mut().for_each(|number| *number *= 1.0 + 1e-6 * self.um_per_m);
         }
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.um_per_m *= by;
     }

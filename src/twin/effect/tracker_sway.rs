@@ -35,9 +35,6 @@ impl Act for TrackerSway {
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.tracker = matrix::times(&by, &motion.tracker);
     }
-    fn seat(&self) -> Option<usize> {
-        None
-    }
     fn scale(&mut self, by: f64) {
         self.shift_um = matrix::scale(self.shift_um, by);
         self.turn_arcsec = matrix::scale(self.turn_arcsec, by);

@@ -85,6 +85,7 @@ fn parameter(
         step: if effect == "joint_compliance" { "stiffness" } else { "geometry" }.into(),
         remark: remark.map(str::to_owned),
         form: None,
+        corrects: None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
-use crate::effect::{Survey, Unknown};
+use crate::effect::{Survey, names};
 
 /// The pool in which causes are, and the fitter that tries them.
 pub(crate) struct ModelComparison<'a, 'b> {
@@ -14,7 +14,7 @@ pub(crate) struct ModelComparison<'a, 'b> {
 impl ModelComparison<'_, '_> {
     /// The name that is said of what is called `effect`: none that the user has excluded.
     pub(super) fn said(&self, effect: &'static str) -> &'static str {
-        if self.fitter.question.without.iter().any(|name| name == effect) { Unknown::NAME } else { effect }
+        if self.fitter.question.without.iter().any(|name| name == effect) { names::UNKNOWN } else { effect }
     }
 
     /// The fit without some of the causes, by their positions.

@@ -7,7 +7,7 @@ use crate::criteria::judge::RIVALS;
 use crate::criteria::search::EQUIVALENT;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Place, Unknown, follows};
+use crate::effect::{Place, follows, names};
 
 /// Exchanges or drops causes that make the folds worse; `set` holds the causes' positions in the pool, in their order.
 pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &ModelComparison) -> (FitState, Vec<FoldGain>) {
@@ -159,7 +159,7 @@ impl Contested {
         let Some(bare) = look(None) else { return Outcome::Unknown };
         // What has no name must prove itself: it has no physics to carry it to other points.
         let harmful = |bare: &FoldErrors| bare.is_better_than(seen);
-        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == Unknown::NAME && seen.gain_over(bare) < 0.0;
+        let useless = |bare: &FoldErrors| harmful(bare) || self.effect == names::UNKNOWN && seen.gain_over(bare) < 0.0;
         // Folds must outweigh what was believed before them; what does harm has lost that right.
         let convinces = |rival: &RivalOf, errors: &FoldErrors| {
             let prejudice = if harmful(&bare) { 0.0 } else { rival.prior_penalty - self.prior_penalty };

@@ -4,8 +4,8 @@
 use super::alternatives::Alternatives;
 use super::comparison::ModelComparison;
 use super::fold_errors::{FoldErrors, FoldGain};
+use crate::diagnose::finding_groups::{FindingGroups, groups};
 use crate::diagnose::round::FitState;
-use crate::diagnose::words::{FindingGroups, groups};
 use crate::estimate::ParameterStatus;
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool

@@ -4,7 +4,7 @@ use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::criteria::open_world::{
     COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
-use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
@@ -348,13 +348,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
 fn name_of(group: &FreeGroup) -> Option<&'static str> {
     let first = group.law.first;
     match (group.motion, first.of, group.law.times) {
-        (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some("backlash"),
-        (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some("zero_shift"),
-        (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some("base_shift"),
-        (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some("tool_shift"),
+        (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some(names::BACKLASH),
+        (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some(names::ZERO_SHIFT),
+        (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some(names::BASE_SHIFT),
+        (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some(names::TOOL_SHIFT),
         (Motion::Joint { joint }, Variable::Angle { joint: a }, Some(times)) => {
             let Variable::Angle { joint: b } = times.of else { return None };
-            ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some("cable_drag")
+            ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some(names::CABLE_DRAG)
         }
         _ => None,
     }

@@ -8,10 +8,10 @@ use super::names::{
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
 use crate::criteria::open_world::{LOUDER, SIZE, STRONG, WORSE};
+use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::diagnose::words::{FindingGroups, FindingKey, groups};
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
 use std::ops::Range;

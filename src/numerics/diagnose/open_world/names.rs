@@ -5,11 +5,11 @@ use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
 use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NEARLY, NOTHING, PLACES, RIVALS};
+use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::diagnose::words::FindingKey;
-use crate::effect::{Place, Unknown};
+use crate::effect::{Place, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -124,7 +124,7 @@ impl NameCase<'_, '_, '_, '_> {
         let own = self.evidence_of_causes(rest, &named.own);
         let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
         let [open, listed] = self.priors(instead.logs.len());
-        let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
+        let is_named = effect != names::UNKNOWN && self.around.without.iter().all(|name| name != effect);
         let mine = listed + own.log - price(&named.members);
         let best_beside = beside.best.first();
         let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);

@@ -4,10 +4,11 @@ use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
 use crate::criteria::open_world::ROUNDS;
+use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::diagnose::words::{FindingKey, of_the_open_world};
+use crate::diagnose::words::of_the_open_world;
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
 

@@ -6,7 +6,7 @@ use super::noise::{JointSpread, RepeatPairs, by_residual};
 use crate::criteria::noise::{ESTIMATES, GEOMETRY, REPEATS, SETTLED, SLOW};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, names, whole};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
@@ -231,7 +231,8 @@ pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Ve
     let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
     let mut model = Model::nominal(from.robot.clone(), stack);
     let stack = model.stack.clone();
-    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != BaseFrame::NAME) {
+    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != names::BASE_FRAME)
+    {
         debug_assert!(effect.form().is_none());
         model.x[range].copy_from_slice(&from.x[found]);
     }

@@ -2,7 +2,7 @@
 
 use super::{CauseSearch, best, decisive, with};
 use crate::criteria::search::{EQUIVALENT, SINGLE, WIDE};
-use crate::effect::{Hypothesis, JointCompliance, JointHardening, JointTable, LinkCompliance};
+use crate::effect::Hypothesis;
 use std::collections::BTreeSet;
 
 impl CauseSearch<'_, '_> {
@@ -75,10 +75,8 @@ impl CauseSearch<'_, '_> {
     pub(super) fn simplest(&self, mut set: Vec<usize>) -> Vec<usize> {
         for h in set.clone() {
             let bent = &self.pool.hypotheses[h].form;
-            if !bent.is(&JointHardening) {
-                continue;
-            }
-            let linear = |other: &Hypothesis| other.form.is(&JointCompliance) && other.form.place() == bent.place();
+            let Some(simpler) = bent.cause().simpler() else { continue };
+            let linear = |other: &Hypothesis| other.form.cause().name() == simpler && other.form.place() == bent.place();
             let Some(simple) = self.pool.hypotheses.iter().position(linear).filter(|simple| !set.contains(simple)) else {
                 continue;
             };
@@ -91,9 +89,8 @@ impl CauseSearch<'_, '_> {
         set
     }
 
-    /// Whether a hypothesis may stand in for two others: a free curve, or the bending of a link for two joints' wind-up.
+    /// Whether a hypothesis may stand in for two others.
     fn stands_in(&self, h: usize) -> bool {
-        let form = &self.pool.hypotheses[h].form;
-        form.cause().is_nameless() || form.is(&JointTable) || form.is(&LinkCompliance)
+        self.pool.hypotheses[h].form.cause().stands_in_for_two()
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::criteria::setup::{CLEARLY, LENGTH, RATIO, SHORT};
 use crate::diagnose::round::FitState;
-use crate::effect::{Place, ReductionRatio, figure};
+use crate::effect::{Place, figure, names};
 use crate::estimate::ParameterStatus;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -26,9 +26,9 @@ pub(super) fn beyond(now: &FitState, robot: &RobotModel, reach: f64) -> Vec<Stri
             let ParameterStatus::Free(sigma) = now.fitted.statuses[k] else { continue };
             let (spec, value) = (&specs[k], now.model.x[k]);
             let limit = match (effect.name(), spec.place, spec.unit) {
-                ("link_geometry", Place::Links(link, _), Unit::Millimetre) => length_error(robot, link, reach),
-                ("link_geometry" | "joint_offset", _, Unit::Radian) => ANGLE,
-                (ReductionRatio::NAME, ..) => *RATIO,
+                (names::LINK_GEOMETRY, Place::Links(link, _), Unit::Millimetre) => length_error(robot, link, reach),
+                (names::LINK_GEOMETRY | names::JOINT_OFFSET, _, Unit::Radian) => ANGLE,
+                (names::REDUCTION_RATIO, ..) => *RATIO,
                 _ => continue,
             };
             if value.abs() > limit + *CLEARLY * sigma {

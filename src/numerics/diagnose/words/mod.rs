@@ -1,25 +1,14 @@
-//! What a diagnosis says: findings with their evidence and rivals, the verdict, and the words for all of it.
+//! The words for what a diagnosis has decided: progress in a line each, findings and the verdict in a sentence each.
 
-mod conclude;
-mod faults;
-mod findings;
-mod groups;
-mod holder;
-mod last_round;
-mod probability;
-mod rivals;
 mod statement;
-mod unseen;
+mod verdict_statement;
 
-pub(crate) use conclude::conclude;
-pub(crate) use groups::{FindingGroups, FindingKey, groups};
-pub(crate) use last_round::LastRound;
-pub use statement::other_means;
+pub(crate) use statement::{hidden, left_out, none_of_the_list, not_so, sentence, slower_than_noise, small, told};
+pub(crate) use verdict_statement::{Ground, statement};
 
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
-use crate::criteria::judge::RIVALS;
 use crate::criteria::words::NAMED;
 use crate::effect::Form;
 use crate::error::counted;
@@ -71,10 +60,10 @@ pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl 
     format!("round {round}: {tried} hypotheses, {causes}{shown}; p = {rest:.3} of such a residual from noise alone")
 }
 
-/// What follows the last round in a line: folds judge what it found.
-pub(crate) fn of_the_judgement(found: &FitState) -> String {
+/// What follows the last round in a line: folds judge what it found, each cause against so many `rivals`.
+pub(crate) fn of_the_judgement(found: &FitState, rivals: usize) -> String {
     let causes = counted(found.causes.len(), "cause");
-    format!("rounds end; {causes} judged at poses that a fit did not see, each against at most {} others in its place", *RIVALS)
+    format!("rounds end; {causes} judged at poses that a fit did not see, each against at most {rivals} others in its place")
 }
 
 /// What follows the judgement in a line.

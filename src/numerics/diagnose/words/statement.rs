@@ -1,37 +1,39 @@
-//! Findings in a sentence that a mechanic understands, and what the recording cannot show.
+//! Findings in a sentence that a mechanic understands.
 
-use crate::criteria::words::STILL;
-use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Place, Summary, Survey, cause, figure};
-use crate::observation::{Dimension, noise, only_brought};
-use crate::robot::Measurements;
+use crate::effect::{HiddenSize, Place, Summary, figure};
+use crate::observation::Dimension;
 
 /// A size in the small unit of its dimension, e.g. `31 um`.
-pub(super) fn small(size: f64, of: Dimension) -> String {
+pub(crate) fn small(size: f64, of: Dimension) -> String {
     format!("{} {}", figure(of.small().from_si(size), 0), of.small().symbol())
 }
 
 /// The sentence of a finding; `rms` is the size of the whole effect in what was measured.
-pub(super) fn sentence(effect: &str, summary: &Summary, rms: &str) -> String {
+pub(crate) fn sentence(effect: &str, summary: &Summary, rms: &str) -> String {
     let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    told(&text, rms)
+}
+
+/// A sentence of a finding as it is in the whole model.
+pub(crate) fn told(text: &str, rms: &str) -> String {
     format!("{text} ({rms} rms at the tool).")
 }
 
 /// The sentence of a finding whose numbers no such effect can have.
-pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> String {
+pub(crate) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> String {
     let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!("something unknown acts at {}: {effect} fits best ({text}), but {why} ({rms} rms at the tool).", summary.place)
 }
 
 /// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
-pub(super) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
+pub(crate) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
     let holds = if share < 0.995 { format!(" explains {:.0} % of it", 100.0 * share) } else { " comes close".into() };
     format!("a cause that is in no list acts at {place} (probability {none:.2}); the nearest of the list{holds}: {nearest}")
 }
 
 /// The sentence of a finding whose name the user has excluded.
-pub(super) fn left_out(summary: &Summary, rms: &str) -> String {
+pub(crate) fn left_out(summary: &Summary, rms: &str) -> String {
     let mut by: Vec<String> = Vec::new();
     for variable in summary.forms.iter().flat_map(|form| form.variables()) {
         let name = summary.clock.named(variable);
@@ -46,74 +48,8 @@ pub(super) fn left_out(summary: &Summary, rms: &str) -> String {
     )
 }
 
-/// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
-pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
-    let mut out = Vec::new();
-    for (joint, reach) in reach.iter().enumerate() {
-        let name = joint + 1;
-        if *reach < *STILL {
-            out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
-        } else if survey.travel(joint) < 0.02 {
-            out.push(format!("joint {name}: it hardly moves; vary it over its range"));
-        } else if !survey.both_directions(joint) {
-            out.push(format!(
-                "joint {name}, backlash: it was approached from one side only; approach half of the poses from the other"
-            ));
-        }
-    }
-    if !survey.payload_changes() {
-        let payload =
-            if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
-        out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
-    }
-    out.extend(masses(survey));
-    let clock = Clock::of(survey.data);
-    if clock == Clock::Rows {
-        out.push("time: none was recorded; the order of the rows is used instead".into());
-    }
-    if survey.data.temperature.is_none() {
-        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
-        out.push(format!("temperature: none was recorded; growth and drift are separated by {by} alone"));
-    }
-    if survey.data.current.is_none() {
-        out.push("counterbalance: without motor currents it is confounded with gear_cyclic of order 1".into());
-    }
-    if survey.data.direction.is_none() {
-        let order =
-            if survey.data.sequence.is_some() { "times, since the rows stand in another order" } else { "order of the rows" };
-        out.push(format!("direction of approach: taken from the {order}"));
-    }
-    let rows: Vec<usize> = (0..survey.data.rows()).collect();
-    if only_brought(survey.data, &rows) {
-        out.push(format!(
-            "anything below the repeatability of closing, {}: nothing but joints was recorded",
-            small(closing(survey.data, &rows), Dimension::Length)
-        ));
-        out.push("place of the base: it moves with all that the target was brought to; measure three points of the cell".into());
-        out.push("scale of the arm: arm, target and fixtures may all be larger together; state `distances` in `identify`".into());
-    } else {
-        out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
-    }
-    out
-}
-
-/// Length of one sigma with which the target comes back, rms over rows, m.
-fn closing(data: &Measurements, rows: &[usize]) -> f64 {
-    let square: f64 = rows.iter().map(|row| noise(data, *row).powi(2)).sum();
-    (square / rows.len().max(1) as f64).sqrt()
-}
-
-/// Effects of the user's own that were not tried, since the recording lacks a column.
-pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<String> {
-    let one = |declared: &&'static DeclaredCause| {
-        let lacking = DeclaredForm::lacking(declared, survey)?;
-        Some(format!("{}: the recording has no {lacking}", declared.name()))
-    };
-    own.iter().filter_map(one).collect()
-}
-
 /// What noise that is correlated from point to point hides.
-pub(super) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
+pub(crate) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
     format!(
         "small slow causes (drift, steps, warm-up): noise is correlated from point to point ({:.2}), as moving air or a tripod leaves \
          it; measure a fixed target every few poses",
@@ -121,50 +57,10 @@ pub(super) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
     )
 }
 
-/// Links whose weight the robot file does not give.
-fn masses(survey: &Survey) -> Option<String> {
-    let all = &survey.robot.description().joints;
-    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
-    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
-    match bare.len() {
-        0 => None,
-        none if none == all.len() => {
-            Some("gravity effects: the robot file gives no link masses; wind-up shows as an angle, no stiffness".into())
-        }
-        some => {
-            let (own, all) = (all.len() - some, all.len());
-            let bare = bare.join(", ");
-            Some(format!(
-                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
-            ))
-        }
-    }
-}
-
-/// Where nothing else is needed.
-const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
-
-/// What would tell findings from their rivals, a sentence each.
-pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<String> {
-    let mut out = Vec::new();
-    for finding in findings {
-        for rival in finding.rivals.iter().take(2) {
-            let how = least([finding.effect, rival.effect].into_iter().filter_map(|name| {
-                let declared = own.iter().find(|declared| declared.name() == name);
-                declared.map_or_else(|| cause(name)?.measure(), |declared| declared.measure())
-            }));
-            let how = how.unwrap_or(POSES);
-            out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
-        }
-    }
-    out
-}
-
-/// What is not a pose and may tell two effects apart, where there is such a thing.
-pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
-    least([a, b].into_iter().filter_map(|name| cause(name)?.measure()))
-}
-
-fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {
-    measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
+/// How large a cause may be that a path is too short or too slow to show; `limit` in SI.
+pub(crate) fn hidden(name: &str, subjects: &str, of: &HiddenSize, limit: f64) -> String {
+    let size =
+        if limit.is_finite() { format!("by up to {:.1} {}", of.unit.from_si(limit), of.unit) } else { "by any amount".into() };
+    let advice = "geometry absorbs it on this path: measure longer, faster, over the joints' whole range";
+    format!("{name}: {subjects} {} {size}; {advice}", of.may)
 }

@@ -7,7 +7,7 @@ use super::declaration::EffectDeclaration;
 use super::pattern::DeclaredPattern;
 use super::seat::Seat;
 use super::words::filled;
-use crate::effect::{Cause, CauseDescription, Measure, Place, Summary, figure};
+use crate::effect::{Cause, CauseDescription, Measure, Place, Summary, figure, names};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
 
@@ -116,8 +116,8 @@ impl Cause for DeclaredCause {
         self.pattern.seat == Seat::Fixed(Place::Tracker)
     }
 
-    fn finer(&self) -> &'static [&'static str] {
-        &["unknown"]
+    fn absorbs_residual(&self) -> &'static [&'static str] {
+        &[names::UNKNOWN]
     }
 
     fn measure(&self) -> Option<Measure> {

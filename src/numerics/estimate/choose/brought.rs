@@ -8,7 +8,7 @@ use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::Site;
 use super::{median, random_sets, subset};
 use crate::criteria::choose::{OFF, POSTURES};
-use crate::effect::{AnchorShift, EffectContext, EffectStack, JointCompliance, Load, whole};
+use crate::effect::{EffectContext, EffectStack, Load, names, whole};
 use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
@@ -107,7 +107,7 @@ fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>
     let robot = robot.clone().measured_by(MeasurementSetup { targets: target.into_iter().collect(), anchors });
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let probe = Measurements { joints: robot.joints(), q: vec![0.0; robot.joints()], ..socketed(vec![0], 1.0) };
-    let effects = [AnchorShift::NAME, "tool_offset", "joint_offset", "link_geometry", JointCompliance::NAME];
+    let effects = [names::ANCHOR, names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY, names::JOINT_COMPLIANCE];
     let made = effects.iter().filter_map(|name| whole(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
     Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, made.collect()))
 }
@@ -213,7 +213,7 @@ pub fn propose_brought(robot: &RobotModel, site: &Site, request: &BroughtRequest
     let random: Vec<Vec<f64>> = sets.iter().step_by(4).map(|set| sigmas(&gather(&rows, set), &before)).collect();
     let prior: Vec<f64> = specs.iter().map(|spec| spec.prior_sigma).collect();
     let usual = |k: usize| median(random.iter().map(|all| all[k]).collect());
-    let arm: Vec<usize> = (0..specs.len()).filter(|k| !specs[*k].name.starts_with(AnchorShift::NAME)).collect();
+    let arm: Vec<usize> = (0..specs.len()).filter(|k| !specs[*k].name.starts_with(names::ANCHOR)).collect();
     let sigma = arm.iter().map(|k| (*k, known[*k] * prior[*k], proposed[*k] * prior[*k], usual(*k) * prior[*k])).collect();
     let without = (0..request.places.len()).map(|socket| {
         let left: Vec<usize> = chosen.iter().copied().filter(|row| sockets[*row] != socket).collect();
@@ -255,7 +255,7 @@ fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let own = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
     // Sockets come first: what is left of the others is beside them.
     let last: Vec<usize> = (0..specs.len()).filter(|k| own(&specs[*k].name)).collect();
-    let mut order: Vec<usize> = model.stack.parameters_of(AnchorShift::NAME).collect();
+    let mut order: Vec<usize> = model.stack.parameters_of(names::ANCHOR).collect();
     let first = order.len();
     order.extend(&last);
     let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].prior_sigma).collect();

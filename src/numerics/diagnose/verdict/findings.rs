@@ -1,20 +1,22 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::faults::{faults, rows_apart};
-use super::groups::{FindingKey, groups};
-use super::holder::HolderTurn;
 use super::last_round::LastRound;
 use super::probability::{weigh, weigh_fault};
 use super::rivals::{exact, rivals};
-use super::statement::{left_out, none_of_the_list, not_so, sentence, small};
 use crate::criteria::words::{ASTRAY, FIRM, REFINEMENT, REJECTED};
+use crate::diagnose::finding_groups::{FindingKey, groups};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
-use crate::effect::{Basis, Clock, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people};
-use crate::estimate::{ErrorScale, ParameterStatus, tail};
+use crate::diagnose::words::{left_out, none_of_the_list, not_so, sentence, small, told};
+use crate::effect::{
+    Basis, Clock, FittedForms, Form, Hypothesis, ModelledFinding, ParameterEstimate, Place, Summary, Variable, follows, names,
+    people,
+};
+use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 
 /// The causes of the last round as findings, strongest first.
@@ -62,13 +64,13 @@ fn unnamed(finding: &mut Finding, odds: &NameOdds) {
         evidence.delta_bic = 2.0 * odds.log;
     }
     let Probabilities { name, place, none } = finding.probabilities;
-    if finding.effect == Unknown::NAME || none <= *REJECTED {
+    if finding.effect == names::UNKNOWN || none <= *REJECTED {
         return;
     }
     finding.statement = none_of_the_list(finding.place, &finding.statement, none, odds.share);
-    finding.rivals.retain(|rival| rival.effect != Unknown::NAME);
+    finding.rivals.retain(|rival| rival.effect != names::UNKNOWN);
     finding.rivals.insert(0, RivalCause { effect: finding.effect, place: finding.place, delta_bic: 0.0, probability: name });
-    finding.effect = Unknown::NAME;
+    finding.effect = names::UNKNOWN;
     finding.probabilities = Probabilities { name: none, place, none: 0.0 };
 }
 
@@ -87,9 +89,12 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
     let mut rivals = rivals(last, &rest, &own, whole.bic, (effect, place));
     exact(effect, &forms, &mut rivals);
-    let turn = HolderTurn::of(state, last.survey.data, &forms).filter(|turn| !last.excludes(turn.rival(effect).effect));
-    let other = turn.as_ref().map(|turn| turn.rival(effect));
-    rivals.extend(other.filter(|other| !rivals.iter().any(|rival| (rival.effect, rival.place) == (other.effect, other.place))));
+    let modelled = modelled(last, effect, &forms);
+    if let Some((effect, place)) = modelled.as_ref().map(|modelled| modelled.same)
+        && !rivals.iter().any(|rival| (rival.effect, rival.place) == (effect, place))
+    {
+        rivals.push(RivalCause { effect, place, delta_bic: 0.0, probability: 0.0 });
+    }
     let scale = last.scale;
     let effect_rms = size((pool, scale), members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
     let without = pool.solve(&rest);
@@ -118,10 +123,10 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
     let why = impossible.or_else(|| varies.map(|(why, _)| why));
     let rms = small(effect_rms, scale.dimension());
-    let (effect, statement) = match (why, turn) {
-        _ if last.excludes(effect) => (Unknown::NAME, left_out(&summary, &rms)),
-        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, &rms)),
-        (None, Some(turn)) => (effect, turn.sentence(clock, &rms)),
+    let (effect, statement) = match (why, modelled) {
+        _ if last.excludes(effect) => (names::UNKNOWN, left_out(&summary, &rms)),
+        (Some(why), _) => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
+        (None, Some(modelled)) => (effect, told(&modelled.sentence, &rms)),
         (None, None) => (effect, sentence(effect, &summary, &rms)),
     };
     // What has lost its name is no rival of itself.
@@ -140,6 +145,15 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     }
 }
 
+/// What a finding is in the fitted model as a whole, unless the user excludes what would do the same.
+fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<ModelledFinding> {
+    let state = &last.judged.state;
+    let Model { robot, stack, x, .. } = &state.model;
+    let fitted = FittedForms { robot, stack, x, data: last.survey.data, rows: &state.screening.kept, called, forms };
+    let modelled = forms.first()?.cause().in_the_model(&fitted)?;
+    (!last.excludes(modelled.same.0)).then_some(modelled)
+}
+
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows, or beyond what the
 /// recording holds.
 fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<String> {
@@ -153,7 +167,7 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
         };
         let values = &state.model.x[range.clone()];
         // The finer shape of a finding is not what it is called by.
-        let own = effect != Unknown::NAME && [form.name(), form.called(values, last.survey)].contains(&effect);
+        let own = effect != names::UNKNOWN && [form.name(), form.called(values, last.survey)].contains(&effect);
         let beyond = own.then(|| form.impossible(values, &error, last.survey)).flatten();
         if beyond.is_some() {
             return beyond;
@@ -175,7 +189,7 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
 
 /// Why what the folds say is nothing of a cause: its absence costs more than all that it does.
 fn more_than_it_does(effect: &str, evidence: &Evidence, of: Dimension) -> Option<String> {
-    let gain = evidence.heldout_gain.filter(|gain| effect != Unknown::NAME && *gain > *ASTRAY * evidence.effect_rms)?;
+    let gain = evidence.heldout_gain.filter(|gain| effect != names::UNKNOWN && *gain > *ASTRAY * evidence.effect_rms)?;
     let [gain, all] = [gain, evidence.effect_rms].map(|size| small(size, of));
     Some(format!("other poses would gain {gain} by it, which is more than all that it does, {all} rms"))
 }
@@ -273,6 +287,6 @@ mod tests {
         assert_eq!(said, "other poses would gain 8300 um by it, which is more than all that it does, 220 um rms");
         assert_eq!(more_than_it_does("gear_cyclic", &evidence(Some(430e-6)), Dimension::Length), None);
         assert_eq!(more_than_it_does("gear_cyclic", &evidence(None), Dimension::Length), None);
-        assert_eq!(more_than_it_does(Unknown::NAME, &evidence(Some(8.3e-3)), Dimension::Length), None);
+        assert_eq!(more_than_it_does(names::UNKNOWN, &evidence(Some(8.3e-3)), Dimension::Length), None);
     }
 }

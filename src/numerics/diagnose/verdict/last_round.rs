@@ -1,6 +1,6 @@
 //! What the last round looked at, and what stands of what it found.
 
-use super::groups::FindingKey;
+use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::CachedHypotheses;

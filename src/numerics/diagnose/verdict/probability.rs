@@ -7,7 +7,7 @@
 use crate::criteria::words::{FAULT, IDENTITY, TEMPERATURE};
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::types::{Finding, Probabilities, RivalCause};
-use crate::effect::Unknown;
+use crate::effect::names;
 
 /// Sets the probabilities of a fault of single rows.
 pub(super) fn weigh_fault(fault: &mut Finding) {
@@ -16,7 +16,7 @@ pub(super) fn weigh_fault(fault: &mut Finding) {
 
 /// Sets the probabilities of a finding and of its rivals; `odds` are those of free forms against names.
 pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds) {
-    if finding.effect == Unknown::NAME {
+    if finding.effect == names::UNKNOWN {
         return weigh_nameless(finding, odds);
     }
     let whole = 1.0 + finding.rivals.iter().map(weight).sum::<f64>();
@@ -77,7 +77,7 @@ mod tests {
         let rivals: Vec<f64> = found.rivals.iter().map(|rival| rival.probability).collect();
         assert!((name + none + rivals.iter().sum::<f64>() - 1.0).abs() < 1e-12 && none == 0.2 && place == 0.9);
         assert!((name - rivals[0]).abs() < 1e-12 && rivals[1] < rivals[0] && rivals[2] < rivals[1]);
-        found.effect = Unknown::NAME;
+        found.effect = names::UNKNOWN;
         weigh(&mut found, &odds);
         let sum: f64 = found.rivals.iter().map(|rival| rival.probability).sum();
         assert!((found.probabilities.name - 0.2).abs() < 1e-12 && (sum - 0.8).abs() < 1e-12);

@@ -2,7 +2,7 @@
 
 use super::last_round::LastRound;
 use crate::diagnose::types::{Finding, Probabilities};
-use crate::effect::{JointLogLag, Place, Unknown};
+use crate::effect::{Place, names};
 use crate::error::counted;
 use crate::estimate::{Suspect, SuspectKind};
 
@@ -12,7 +12,7 @@ pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
     let how = if offset < 0 { "ahead of" } else { "behind" };
     let text =
         format!("the joints of a point are {rows} {how} it: join the two logs again, nothing else can be diagnosed before");
-    of_the_recording(JointLogLag::NAME, text, last)
+    of_the_recording(names::JOINT_LOG_LAG, text, last)
 }
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
@@ -33,23 +33,27 @@ pub(super) fn faults(last: &LastRound, unknown: Option<usize>) -> Vec<Finding> {
     let mut out = Vec::new();
     let swapped = of(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
     if !swapped.is_empty() {
-        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped)), last));
+        out.push(of_the_recording(
+            names::MISLABELLED_POINT,
+            format!("points carry another point's name: {}", list(&swapped)),
+            last,
+        ));
     }
     let shifted = of(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
     if !shifted.is_empty() {
         let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
-        out.push(of_the_recording(JointLogLag::NAME, text, last));
+        out.push(of_the_recording(names::JOINT_LOG_LAG, text, last));
     }
     let wrong = of(|kind| matches!(kind, SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero));
     if !wrong.is_empty() {
-        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong)), last));
+        out.push(of_the_recording(names::OUTLIER, format!("single wrong points: {}", list(&wrong)), last));
     }
     out
 }
 
 /// A fault of the recording; without its name where that is not to be given.
 fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -> Finding {
-    let effect = if last.excludes(effect) { Unknown::NAME } else { effect };
+    let effect = if last.excludes(effect) { names::UNKNOWN } else { effect };
     Finding {
         effect,
         place: Place::Recording,

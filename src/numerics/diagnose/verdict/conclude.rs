@@ -2,8 +2,8 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
-use super::statement::{next, not_observable, not_tried, slower_than_noise};
-use super::unseen::by_speed;
+use super::not_observable::{next, not_observable, not_tried};
+use super::unseen::unseen;
 use crate::criteria::judge::FOLDS;
 use crate::criteria::noise::{LOUD, REPEATS, TOO_LOUD};
 use crate::criteria::search::SIGNIFICANT;
@@ -13,8 +13,8 @@ use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::Misfit;
 use crate::diagnose::round::Fitter;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::diagnose::verdict_statement::{Ground, statement};
-use crate::effect::Unknown;
+use crate::diagnose::words::{Ground, slower_than_noise, statement};
+use crate::effect::names;
 use crate::estimate::{Model, cross_validate};
 use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
@@ -46,7 +46,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
-    not_observable.extend(by_speed(&last));
+    not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
@@ -127,14 +127,14 @@ fn nameless_share(findings: &[Finding]) -> f64 {
             .map(|e| e.gain)
             .sum()
     };
-    let unnamed = |finding: &Finding| finding.effect == Unknown::NAME || finding.probabilities.none > 0.5;
+    let unnamed = |finding: &Finding| finding.effect == names::UNKNOWN || finding.probabilities.none > 0.5;
     gains(&unnamed) / gains(&|_| true).max(f64::MIN_POSITIVE)
 }
 
 /// Whether something was found, and none of it has a name.
 fn only_unknown(findings: &[Finding]) -> bool {
     let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
-    physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME)
+    physics.peek().is_some() && physics.all(|finding| finding.effect == names::UNKNOWN)
 }
 
 fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {

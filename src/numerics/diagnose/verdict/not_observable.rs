@@ -1,0 +1,122 @@
+//! What a recording cannot show whatever the truth, and what to measure so that it does.
+
+use crate::criteria::words::STILL;
+use crate::diagnose::types::Finding;
+use crate::diagnose::words::small;
+use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause};
+use crate::observation::{Dimension, noise, only_brought};
+use crate::robot::Measurements;
+
+/// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
+pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
+    let mut out = Vec::new();
+    for (joint, reach) in reach.iter().enumerate() {
+        let name = joint + 1;
+        if *reach < *STILL {
+            out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
+        } else if survey.travel(joint) < 0.02 {
+            out.push(format!("joint {name}: it hardly moves; vary it over its range"));
+        } else if !survey.both_directions(joint) {
+            out.push(format!(
+                "joint {name}, backlash: it was approached from one side only; approach half of the poses from the other"
+            ));
+        }
+    }
+    if !survey.payload_changes() {
+        let payload =
+            if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
+        out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
+    }
+    out.extend(masses(survey));
+    let clock = Clock::of(survey.data);
+    if clock == Clock::Rows {
+        out.push("time: none was recorded; the order of the rows is used instead".into());
+    }
+    if survey.data.temperature.is_none() {
+        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
+        out.push(format!("temperature: none was recorded; growth and drift are separated by {by} alone"));
+    }
+    if survey.data.current.is_none() {
+        out.push("counterbalance: without motor currents it is confounded with gear_cyclic of order 1".into());
+    }
+    if survey.data.direction.is_none() {
+        let order =
+            if survey.data.sequence.is_some() { "times, since the rows stand in another order" } else { "order of the rows" };
+        out.push(format!("direction of approach: taken from the {order}"));
+    }
+    let rows: Vec<usize> = (0..survey.data.rows()).collect();
+    if only_brought(survey.data, &rows) {
+        out.push(format!(
+            "anything below the repeatability of closing, {}: nothing but joints was recorded",
+            small(closing(survey.data, &rows), Dimension::Length)
+        ));
+        out.push("place of the base: it moves with all that the target was brought to; measure three points of the cell".into());
+        out.push("scale of the arm: arm, target and fixtures may all be larger together; state `distances` in `identify`".into());
+    } else {
+        out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+    }
+    out
+}
+
+/// Length of one sigma with which the target comes back, rms over rows, m.
+fn closing(data: &Measurements, rows: &[usize]) -> f64 {
+    let square: f64 = rows.iter().map(|row| noise(data, *row).powi(2)).sum();
+    (square / rows.len().max(1) as f64).sqrt()
+}
+
+/// Effects of the user's own that were not tried, since the recording lacks a column.
+pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<String> {
+    let one = |declared: &&'static DeclaredCause| {
+        let lacking = DeclaredForm::lacking(declared, survey)?;
+        Some(format!("{}: the recording has no {lacking}", declared.name()))
+    };
+    own.iter().filter_map(one).collect()
+}
+
+/// Links whose weight the robot file does not give.
+fn masses(survey: &Survey) -> Option<String> {
+    let all = &survey.robot.description().joints;
+    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
+    match bare.len() {
+        0 => None,
+        none if none == all.len() => {
+            Some("gravity effects: the robot file gives no link masses; wind-up shows as an angle, no stiffness".into())
+        }
+        some => {
+            let (own, all) = (all.len() - some, all.len());
+            let bare = bare.join(", ");
+            Some(format!(
+                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+            ))
+        }
+    }
+}
+
+/// Where nothing else is needed.
+const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
+
+/// What would tell findings from their rivals, a sentence each.
+pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<String> {
+    let mut out = Vec::new();
+    for finding in findings {
+        for rival in finding.rivals.iter().take(2) {
+            let how = least([finding.effect, rival.effect].into_iter().filter_map(|name| {
+                let declared = own.iter().find(|declared| declared.name() == name);
+                declared.map_or_else(|| cause(name)?.measure(), |declared| declared.measure())
+            }));
+            let how = how.unwrap_or(POSES);
+            out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
+        }
+    }
+    out
+}
+
+/// What is not a pose and may tell two effects apart, where there is such a thing.
+pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
+    least([a, b].into_iter().filter_map(|name| cause(name)?.measure()))
+}
+
+fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {
+    measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
+}
