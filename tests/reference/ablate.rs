@@ -10,7 +10,7 @@
 use calib_numerics::criteria::{CriterionFactor, reached, scale};
 use calib_numerics::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib_numerics::estimate::gauge;
-use calib_numerics::robot::{Measurements, NoiseBasis, RobotModel, Sequence};
+use calib_numerics::robot::{Measurements, NoiseBasis, PointReadings, RobotModel, Sequence};
 use calib_twin::conceal::case::Case;
 use calib_twin::conceal::design::{Content, Design};
 use calib_twin::conceal::family::Column;
@@ -25,8 +25,10 @@ fn measured(case: &Case) -> Measurements {
     let mut data = Measurements {
         joints: case.robot.joints.len(),
         q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
-        position: shots.iter().map(|shot| Vector3::from(shot.position)).collect(),
-        sigma: shots.iter().map(|shot| Vector3::repeat(shot.sigma)).collect(),
+        points: PointReadings {
+            position: shots.iter().map(|shot| Vector3::from(shot.position)).collect(),
+            sigma: shots.iter().map(|shot| Vector3::repeat(shot.sigma)).collect(),
+        },
         payload: case.payload_kg.clone(),
         time: shown(Column::Time).then(|| shots.iter().map(|shot| shot.time_s).collect()),
         temperature: shown(Column::Temperature).then(|| case.thermometer_c.clone()),
@@ -79,7 +81,7 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
         all.iter().any(|want| same(want, own)) || case.accepted.iter().any(|(effect, place)| *effect == own.0 && *place == own.1)
     };
     let exact = is_listed && want.iter().all(|want| named.iter().any(|own| same(want, own))) && named.iter().all(&accepted);
-    let wrong = named.iter().any(|own| own.0 != "unknown" && own.2 >= 0.5 && !(is_listed && accepted(own)));
+    let wrong = named.iter().any(|own| own.0 != "unknown" && own.2 >= 0.5 && !accepted(own));
     let placed = case.concealed.first().is_none_or(|one| {
         let places = || std::iter::once(&one.cause.place).chain(case.accepted.iter().map(|(_, place)| place));
         named.iter().any(|own| places().any(|place| own.1 == *place))

@@ -7,9 +7,9 @@ criteria! {
     "noise";
     /// A residual this much larger than the noise, in mean square, does not agree with it: where it has structure it is not
     /// explained ...
-    LOUD: f64 = 1.25, "ratio of squares", "judgement: more than a stated sigma is off by", "";
+    LOUD: f64 = 1.25, "ratio of squares", "judgement: more than a stated sigma is off by", "changes nothing on 2";
     /// ... and this much larger it is not whatever it looks like.
-    TOO_LOUD: f64 = 2.5, "ratio of squares", "judgement: no stated sigma is off by 60 %", "";
+    TOO_LOUD: f64 = 2.5, "ratio of squares", "judgement: no stated sigma is off by 60 %", "changes nothing on 2";
     /// Repeats that make the noise known; with fewer it is taken from a residual without structure.
     REPEATS: usize = 10, "repeats", "count: a standard deviation known to a quarter", "";
     /// Fewer repeats than this say too little.
@@ -19,11 +19,11 @@ criteria! {
     /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
     SEARCHED: usize = 800, "rows", "judgement: bounds time", "";
     /// Rows that count as fewer than this are independent.
-    ALONE: f64 = 1.2, "rows", "judgement: a sixth of correlation is none", "";
+    ALONE: f64 = 1.2, "rows", "judgement: a sixth of correlation is none", "changes nothing on 2";
     /// With fewer stretches than this signs by stretch say nothing.
     STRETCHES: usize = 40, "stretches", "count: a bootstrap by signs needs tens of units", "";
     /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
-    PLAIN: f64 = 20.0, "-2 ln of odds", "literature: strong evidence, doubled, Kass and Raftery (1995)", "";
+    PLAIN: f64 = 20.0, "-2 ln of odds", "literature: strong evidence, doubled, Kass and Raftery (1995)", "changes nothing on 2";
     /// Causes that follow time must be better than correlated noise by strong evidence: such noise is everywhere.
     CLEARER: f64 = 8.0, "-2 ln of odds", "literature: strong evidence, Kass and Raftery (1995)", "";
     /// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree

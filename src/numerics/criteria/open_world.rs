@@ -10,13 +10,13 @@ criteria! {
     /// Groups of a place at most.
     GROUPS: usize = 4, "groups", "judgement: bounds time", "";
     /// ln of the evidence by which a further group must pay for itself, beyond the price of its choice.
-    PAYS: f64 = 1.0, "ln of evidence", "literature: barely worth a mention, Jeffreys (1961)", "";
+    PAYS: f64 = 1.0, "ln of evidence", "literature: barely worth a mention, Jeffreys (1961)", "changes nothing on 2";
     /// How often the number of a group's variable is halved in its step.
     LEVELS: i32 = 4, "levels", "judgement: bounds time", "";
     /// Groups whose shorter lengths are looked at.
     CLOSER: usize = 10, "groups", "judgement: bounds time", "";
     /// Correlation lengths of smooth functions, shares of their variable's range.
-    LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02], "share of the range", "count: threefold from the whole range to what cosines resolve", "";
+    LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02], "share of the range", "count: threefold from the whole range to what cosines resolve", "changes nothing on 2";
     /// Cosines of the turn of a joint over its own angle, as gears make it.
     FINEST: usize = 48, "cosines", "count: orders of a gear per turn", "";
     /// Cosines over a motion's own angle and over time.
@@ -30,9 +30,9 @@ criteria! {
     /// Cosines by which one of two variables is told from the other.
     TOLD_BY: usize = 6, "cosines", "judgement: bounds time", "";
     /// The share of its variance above which one variable follows the other: then it shows no product of both.
-    TOLD: f64 = 0.7, "share of the variance", "judgement: half of what one variable says is its own", "";
+    TOLD: f64 = 0.7, "share of the variance", "judgement: half of what one variable says is its own", "changes nothing on 2";
     /// Cosines have no slope at the ends of their range: it is wider than the rows' by this share at either end.
-    MARGIN: f64 = 0.1, "share of the range", "judgement: a slope at the end of the rows stays possible", "";
+    MARGIN: f64 = 0.1, "share of the range", "judgement: a slope at the end of the rows stays possible", "changes nothing on 2";
     /// A variable of no more values than this is a number of its own, not a range.
     NUMBERS: usize = 3, "values", "count: three values bear no curve", "";
     /// Steps in time that are tried.
@@ -43,15 +43,15 @@ criteria! {
     FADING: [f64; 3] = [15.0, 35.0, 80.0], "s", "judgement: between two readings and some minutes", "";
     /// ln of the evidence of a free form beside everything, over the number of places, above which it joins; and by which one
     /// is better than all causes together where it stands in their place.
-    STRONG: f64 = 3.0, "ln of evidence", "literature: strong, Jeffreys (1961)", "";
+    STRONG: f64 = 3.0, "ln of evidence", "literature: strong, Jeffreys (1961)", "changes nothing on 1";
     /// ln of what each cause's size costs beside a known one.
-    SIZE: f64 = 3.0, "ln of evidence", "judgement: a size is one of some twenty on the grid", "";
+    SIZE: f64 = 3.0, "ln of evidence", "judgement: a size is one of some twenty on the grid", "changes nothing on 1";
     /// What goes may cost this share of the folds' rms.
     WORSE: f64 = 0.01, "share of the rms", "judgement: what a user would not notice", "";
     /// A noise that is larger than stated by less than this share, in squares, is the stated one.
-    LOUDER: f64 = 1.05, "ratio of squares", "judgement: the scatter of a variance of a thousand values", "";
+    LOUDER: f64 = 1.05, "ratio of squares", "judgement: the scatter of a variance of a thousand values", "changes nothing on 2";
     /// Prior odds that nothing is there.
-    NOTHING: f64 = 0.5, "probability", "literature: indifference", "";
+    NOTHING: f64 = 0.5, "probability", "literature: indifference", "changes nothing on 2";
     /// Rivals whose evidence is asked.
     RIVALS: usize = 12, "causes", "judgement: bounds time", "";
     /// A law of the list is never quite the true one: what a free form at its own place adds is its finer shape below this
@@ -59,12 +59,12 @@ criteria! {
     FINER: f64 = 0.1, "share", "judgement: arms and twin differ from the library by less", "";
     /// A free form instead of a name at its own place is the finer shape of that name where the name alone explains all but
     /// this share of what the form does: with enough rows no law of the list is exact.
-    NEARLY: f64 = 0.01, "share of the squared residual's fall", "judgement: a tenth of the effect", "";
+    NEARLY: f64 = 0.01, "share of the squared residual's fall", "judgement: a tenth of the effect", "changes nothing on 1";
     /// ln of the evidence by which a free form must be better than a name with a free form beside it, to stand in its place.
     CLEARLY: f64 = 3.0, "ln of evidence", "literature: strong, Jeffreys (1961)", "";
     /// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of
     /// names that were wrong where it was sure of them.
-    MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "";
+    MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "changes nothing on 2";
     /// Places at which a free form is asked with more than one group.
     PLACES: usize = 2, "places", "judgement: bounds time", "";
     /// Functions of each variable that are looked at.
@@ -72,7 +72,7 @@ criteria! {
     /// Products of a motion that become groups.
     PICKED: usize = 6, "groups", "judgement: bounds time", "";
     /// Mean square of what is left, over that of noise, below which nothing is looked for.
-    STRUCTURED: f64 = 1.1, "ratio of squares", "judgement: the scatter of a variance of some hundred values, doubled", "";
+    STRUCTURED: f64 = 1.1, "ratio of squares", "judgement: the scatter of a variance of some hundred values, doubled", "changes nothing on 2";
     /// Changes of a model at most.
     ROUNDS: usize = 6, "rounds", "judgement: bounds time", "";
 }

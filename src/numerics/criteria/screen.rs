@@ -11,9 +11,9 @@ criteria! {
     /// The bulk ends at this quantile of the rows that are not gross ...
     BULK: f64 = 0.98, "quantile", "judgement: one row in fifty may be wrong", "";
     /// ... and far outside begins this many times farther out: with normal noise at 9.4 standard deviations.
-    FAR: f64 = 3.0, "ratio", "count: with normal noise 9.4 standard deviations", "";
+    FAR: f64 = 3.0, "ratio", "count: with normal noise 9.4 standard deviations", "changes nothing on 2";
     /// With more than this share of unexplained rows, beyond what chance adds, the model is wrong and not the rows.
-    CROWD: f64 = 0.125, "share", "judgement: an eighth", "";
+    CROWD: f64 = 0.125, "share", "judgement: an eighth", "changes nothing on 2";
     /// Among a crowd, only rows this many times the limit away are mistakes all the same.
     BEYOND_CROWD: f64 = 10.0, "ratio", "judgement: an order of magnitude", "";
     /// A nominal robot puts its points right to this share of their distance from the tracker; units differ by far more.

@@ -12,17 +12,17 @@ criteria! {
     /// A criterion that is worse by more than this without it makes it a finding all the same.
     WEAK: f64 = 60.0, "-2 ln of odds", "judgement: beyond that it is seen, however small", "";
     /// What has no name explains nothing where it is more than this share of what was found.
-    NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "";
+    NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
     /// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little
     /// it is confirmed.
-    REJECTED: f64 = 0.95, "probability", "literature: 95 %", "";
+    REJECTED: f64 = 0.95, "probability", "literature: 95 %", "changes nothing on 1";
     /// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went
     /// astray.
     ASTRAY: f64 = 2.0, "ratio", "judgement: folds of five scatter by less", "";
     /// Orders that a smooth function of an angle may have, too.
     SLOW: u32 = 2, "orders", "count: two periods", "";
     /// Less than this share of a finding's gain at its own joint is its finer shape.
-    REFINEMENT: f64 = 0.1, "share of the gain", "judgement: a tenth", "";
+    REFINEMENT: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
     /// Less than this share of the gain of a lag of all joints, anywhere, is its trace.
     TRACE: f64 = 0.05, "share of the gain", "judgement: a twentieth", "";
     /// The radius, and the place along the axis, may change by this share of the displacement.
@@ -30,7 +30,7 @@ criteria! {
     /// Causes of a round that are named.
     NAMED: usize = 4, "causes", "judgement: length of a line", "";
     /// The temperature at which names share what free forms leave.
-    TEMPERATURE: f64 = 2.03, "1", "measured by tests/reference/calibrate_probability.py", "";
+    TEMPERATURE: f64 = 2.03, "1", "measured by tests/reference/calibrate_probability.py", "changes nothing on 1";
     /// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
     IDENTITY: f64 = 6.3, "-2 ln of odds", "measured by tests/reference/calibrate_probability.py", "";
     /// Faults of single rows are seen as such or not at all.
