@@ -1,7 +1,8 @@
 //! `ingest`: from raw files (text, workbooks, columns) to one recording; what is not used goes to `rejected` with file, line and reason.
 //!
-//! Files are read twice: first to judge rows and find duplicates and partners, then to write; so nothing is written of a
-//! file that is refused, and memory stays bounded. Per file, accepted + rejected = read.
+//! Rows are judged and written in one reading, as if each were used with its partner. Where the whole says otherwise (a point id twice, rows
+//! joined by time, velocities), files are read a second time to write. A table that is begun of a file that is refused is dropped, and memory
+//! stays bounded. Per file, accepted + rejected = read.
 
 mod arm;
 mod axes;
@@ -23,6 +24,7 @@ mod mapped;
 mod motion;
 mod noise;
 mod number;
+mod once;
 mod pair;
 mod parquet;
 mod reading;
@@ -157,12 +159,12 @@ impl Stage for Ingest {
         }
         let arm = arm::RobotJoints::of(&reads.robot)?;
         let measurements = self.measurements();
-        let mut scanned = Vec::new();
+        let (mut scanned, mut written) = (Vec::new(), None);
         for one in &measurements {
-            let scan = |(index, layout)| scan::scan(one, index, layout, &arm, context);
-            let mut scans = one.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
+            let (mut scans, ahead) = once::read(one, &arm, measurements.len() == 1, context)?;
             let decisions = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
             verdict::judge(one, &scans, &decisions, &arm, context)?;
+            written = ahead.filter(|ahead| ahead.stands(&decisions));
             scanned.push((scans, decisions));
         }
         copies::refuse(&scanned)?;
@@ -172,7 +174,10 @@ impl Stage for Ingest {
             .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
             .collect();
         let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
-        let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
+        let (recording, rejected) = match (written, decided.as_slice()) {
+            (Some(written), [one]) => written.finish(one, context)?,
+            _ => write::write(&decided, &gaps, &names, context)?,
+        };
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })
     }

@@ -8,6 +8,7 @@ mod kinds;
 mod later;
 mod moving;
 mod noise;
+mod once;
 mod programs;
 mod refusals;
 mod together;

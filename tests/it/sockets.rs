@@ -14,7 +14,7 @@ mod twins;
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::description::RobotDescription;
-use calib::effect::{AnchorShift, names};
+use calib::effect::names;
 use calib::error::Result;
 use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::{Measurements, Named, RobotModel};

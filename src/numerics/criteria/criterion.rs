@@ -1,14 +1,14 @@
 //! A number by which something is decided: `*NAME` is its value.
 
 #[cfg(feature = "ablate")]
-use super::scaled::{Scaled, Scaling};
+use super::scaled::{CriterionScaling, Scaled};
 use std::ops::Deref;
 
 /// A number by which something is decided.
 pub struct CriterionValue<T: 'static> {
     value: T,
     #[cfg(feature = "ablate")]
-    scaling: Scaling<T>,
+    scaling: CriterionScaling<T>,
 }
 
 impl<T> CriterionValue<T> {
@@ -16,7 +16,7 @@ impl<T> CriterionValue<T> {
         Self {
             value,
             #[cfg(feature = "ablate")]
-            scaling: Scaling::new(),
+            scaling: CriterionScaling::new(),
         }
     }
 }

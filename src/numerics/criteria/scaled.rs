@@ -16,14 +16,14 @@ pub enum CriterionFactor {
 }
 
 /// How a criterion is scaled, and whether something came by.
-pub(super) struct Scaling<T: 'static> {
+pub(super) struct CriterionScaling<T: 'static> {
     half: OnceLock<T>,
     double: OnceLock<T>,
     factor: AtomicU8,
     reached: AtomicBool,
 }
 
-impl<T> Scaling<T> {
+impl<T> CriterionScaling<T> {
     pub(super) const fn new() -> Self {
         Self { half: OnceLock::new(), double: OnceLock::new(), factor: AtomicU8::new(0), reached: AtomicBool::new(false) }
     }
@@ -37,7 +37,7 @@ impl<T> Scaling<T> {
     }
 }
 
-impl<T: Scaled> Scaling<T> {
+impl<T: Scaled> CriterionScaling<T> {
     /// What stands for a value now.
     pub(super) fn of<'v>(&'v self, value: &'v T) -> &'v T {
         self.reached.store(true, Ordering::Relaxed);

@@ -115,16 +115,16 @@ pub(super) fn columns_of(
     if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
         return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
     }
-    let (mut whole, mut room) = (vec![0.0; scene.rows()], Vec::new());
     let joints = form.cause.acts_on(form, scene.joints());
-    let mut columns = vec![TorqueColumn { joints: joints.clone(), courses: Vec::new() }; form.width];
-    for (number, column) in columns.iter_mut().enumerate() {
-        for joint in &joints {
-            form.cause.write(form, scene, *joint, number, &mut whole);
-            column.courses.push(reduction.reduce(&mut whole, &mut room));
-        }
-    }
-    columns
+    let written = |(number, joint): (usize, usize)| {
+        let mut whole = vec![0.0; scene.rows()];
+        form.cause.write(form, scene, joint, number, &mut whole);
+        whole
+    };
+    let places = (0..form.width).flat_map(|number| joints.iter().map(move |joint| (number, *joint)));
+    let mut courses = reduction.reduce(places.map(written).collect()).into_iter();
+    let column = |_| TorqueColumn { courses: courses.by_ref().take(joints.len()).collect(), joints: joints.clone() };
+    (0..form.width).map(column).collect()
 }
 
 /// Changes of links' numbers with their columns and 1 / variance beforehand.

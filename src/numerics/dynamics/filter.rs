@@ -5,13 +5,17 @@ use std::f64::consts::PI;
 /// Above this share of the rate the low-pass would do nothing.
 const IDLE: f64 = 0.45;
 
+/// Courses that are filtered side by side.
+const LANES: usize = 4;
+
 /// A section of second order: b0 b1 b2 a1 a2.
 type Section = [f64; 5];
 
 /// The zero-phase low-pass for one rate and cut-off.
 #[derive(Debug, Clone)]
 pub(super) struct ZeroPhase {
-    sections: Vec<Section>,
+    /// None where it changes nothing.
+    sections: Option<[Section; 2]>,
     /// Rows by which a course is continued at each end.
     padding: usize,
 }
@@ -20,7 +24,7 @@ impl ZeroPhase {
     /// Of a rate and a cut-off, Hz; above 0.45 times the rate it changes nothing.
     pub fn new(rate: f64, cutoff: f64) -> Self {
         if cutoff >= IDLE * rate {
-            return Self { sections: Vec::new(), padding: 0 };
+            return Self { sections: None, padding: 0 };
         }
         let warped = (PI * cutoff / rate).tan();
         let section = |pole: usize| {
@@ -29,39 +33,78 @@ impl ZeroPhase {
             let b = warped * warped * scale;
             [b, 2.0 * b, b, 2.0 * (warped * warped - 1.0) * scale, (1.0 - damping * warped + warped * warped) * scale]
         };
-        Self { sections: vec![section(0), section(1)], padding: (3.0 * rate / cutoff) as usize + 15 }
+        Self { sections: Some([section(0), section(1)]), padding: (3.0 * rate / cutoff) as usize + 15 }
     }
 
-    /// Filters a course in place; `room` is reused from call to call.
-    pub fn apply(&self, course: &mut [f64], room: &mut Vec<f64>) {
-        if self.sections.is_empty() || course.len() < 3 {
-            return;
+    /// Filters courses of one length in place.
+    pub fn apply<C: AsMut<[f64]>>(&self, courses: &mut [C]) {
+        let mut lanes = courses.chunks_exact_mut(LANES);
+        for several in &mut lanes {
+            if let Ok(several) = <&mut [C; LANES]>::try_from(several) {
+                self.together(several);
+            }
         }
-        let (rows, padding) = (course.len(), self.padding.min(course.len() - 2));
-        room.clear();
+        lanes.into_remainder().iter_mut().for_each(|one| self.together(std::array::from_mut(one)));
+    }
+
+    /// Filters some courses side by side: each value waits for the one before, other courses do not.
+    fn together<C: AsMut<[f64]>, const L: usize>(&self, courses: &mut [C; L]) {
+        let mut courses = courses.each_mut().map(|course| course.as_mut());
+        let rows = courses[0].len();
+        let Some(sections) = self.sections.as_ref().filter(|_| rows >= 3) else { return };
+        let padding = self.padding.min(rows - 2);
+        let all = |row: usize| -> [f64; L] { std::array::from_fn(|lane| courses[lane][row]) };
         // Continued by a half turn about each end.
-        room.extend((1..=padding).rev().map(|back| 2.0 * course[0] - course[back]));
-        room.extend_from_slice(course);
-        room.extend((1..=padding).map(|ahead| 2.0 * course[rows - 1] - course[rows - 1 - ahead]));
-        for _ in 0..2 {
-            self.sections.iter().for_each(|section| run(section, room));
-            room.reverse();
+        let beyond = |end: [f64; L], inside: [f64; L]| -> [f64; L] { std::array::from_fn(|lane| 2.0 * end[lane] - inside[lane]) };
+        let (first, last) = (all(0), all(rows - 1));
+        let mut room: Vec<[f64; L]> = Vec::with_capacity(rows + 2 * padding);
+        room.extend((1..=padding).rev().map(|back| beyond(first, all(back))));
+        room.extend((0..rows).map(all));
+        room.extend((1..=padding).map(|ahead| beyond(last, all(rows - 1 - ahead))));
+        Self::run(sections, room.iter_mut());
+        Self::run(sections, room.iter_mut().rev());
+        for (row, values) in room[padding..padding + rows].iter().enumerate() {
+            courses.iter_mut().zip(values).for_each(|(course, value)| course[row] = *value);
         }
-        course.copy_from_slice(&room[padding..padding + rows]);
+    }
+
+    /// Both sections over courses side by side.
+    fn run<'a, const L: usize>([slow, quick]: &[Section; 2], mut rows: impl Iterator<Item = &'a mut [f64; L]>) {
+        let Some(first) = rows.next() else { return };
+        let mut one = SectionState::standing(slow, first);
+        one.step(slow, first);
+        let mut other = SectionState::standing(quick, first);
+        other.step(quick, first);
+        for values in rows {
+            one.step(slow, values);
+            other.step(quick, values);
+        }
     }
 }
 
-/// One section over a course, begun as if the first value had stood for ever.
-fn run([b0, b1, b2, a1, a2]: &Section, course: &mut [f64]) {
-    let first = course[0];
-    let mut second_state = (b2 - a2) * first;
-    let mut first_state = (b1 - a1) * first + second_state;
-    for value in course {
-        let input = *value;
-        let output = b0 * input + first_state;
-        first_state = b1 * input - a1 * output + second_state;
-        second_state = b2 * input - a2 * output;
-        *value = output;
+/// What a section remembers of courses side by side.
+struct SectionState<const L: usize> {
+    first: [f64; L],
+    second: [f64; L],
+}
+
+impl<const L: usize> SectionState<L> {
+    /// As if these values had stood for ever.
+    fn standing([_, b1, b2, a1, a2]: &Section, values: &[f64; L]) -> Self {
+        let second = values.map(|value| (b2 - a2) * value);
+        Self { first: std::array::from_fn(|lane| (b1 - a1) * values[lane] + second[lane]), second }
+    }
+
+    /// Makes the next values of them.
+    #[inline(always)]
+    fn step(&mut self, [b0, b1, b2, a1, a2]: &Section, values: &mut [f64; L]) {
+        for (lane, value) in values.iter_mut().enumerate() {
+            let input = *value;
+            let output = b0 * input + self.first[lane];
+            self.first[lane] = b1 * input - a1 * output + self.second[lane];
+            self.second[lane] = b2 * input - a2 * output;
+            *value = output;
+        }
     }
 }
 
@@ -80,7 +123,7 @@ mod tests {
         let filter = ZeroPhase::new(rate, cutoff);
         for hertz in [1.0, 5.0, 10.0, 14.0] {
             let mut course = sine(rate, hertz, rows);
-            filter.apply(&mut course, &mut Vec::new());
+            filter.apply(&mut [&mut course[..]]);
             let ratio = (PI * hertz / rate).tan() / (PI * cutoff / rate).tan();
             let expected = 1.0 / (1.0 + ratio.powi(8));
             let before = sine(rate, hertz, rows);
@@ -93,8 +136,20 @@ mod tests {
     fn what_stands_still_or_rises_evenly_is_left_as_it_is() {
         let filter = ZeroPhase::new(100.0, 10.0);
         let mut course: Vec<f64> = (0..300).map(|row| 3.0 + 0.2 * f64::from(row)).collect();
-        filter.apply(&mut course, &mut Vec::new());
+        filter.apply(&mut [&mut course[..]]);
         let worst = course.iter().enumerate().map(|(row, value)| (value - 3.0 - 0.2 * row as f64).abs()).fold(0.0, f64::max);
         assert!(worst < 0.02, "{worst}");
+    }
+
+    #[test]
+    fn a_course_is_filtered_alike_alone_and_beside_others() {
+        let filter = ZeroPhase::new(100.0, 10.0);
+        let courses: Vec<Vec<f64>> = (1..=6).map(|hertz| sine(100.0, f64::from(hertz), 400)).collect();
+        let mut together = courses.clone();
+        filter.apply(&mut together);
+        for (mut course, together) in courses.into_iter().zip(together) {
+            filter.apply(&mut [&mut course[..]]);
+            assert_eq!(course, together);
+        }
     }
 }

@@ -54,13 +54,9 @@ impl<'a> TorqueProblem<'a> {
         let scene = DynamicScene::new(arm, &recording, clock, cutoff, question.free_inertials);
         let reduction = Reduction::new(clock, cutoff);
         let regressor = ReducedRegressor::of(&scene, &reduction);
-        let mut room = Vec::new();
-        let filtered = |joint: usize| {
-            let mut course = column(&recording.torque, recording.joints, joint);
-            reduction.filter(&mut course, &mut room);
-            course
-        };
-        let torque = (0..recording.joints).map(filtered).collect();
+        let mut torque: Vec<Vec<f64>> =
+            (0..recording.joints).map(|joint| column(&recording.torque, recording.joints, joint)).collect();
+        reduction.filter(&mut torque);
         let theta = scene.declared.as_ref().map_or_else(|| vec![0.0; 10 * recording.joints], |declared| declared.theta.clone());
         let mut problem = Self {
             held_out: reduction.rows.iter().map(|row| recording.held_out[*row]).collect(),

@@ -54,22 +54,25 @@ impl Reduction {
         }
     }
 
-    /// Filters a whole course (as long as the recording) in place.
-    pub fn filter(&self, course: &mut [f64], room: &mut Vec<f64>) {
-        self.stretches.iter().for_each(|stretch| self.filter.apply(&mut course[stretch.clone()], room));
+    /// Filters whole courses (as long as the recording) in place.
+    pub fn filter(&self, courses: &mut [Vec<f64>]) {
+        for stretch in &self.stretches {
+            let mut own: Vec<&mut [f64]> = courses.iter_mut().map(|course| &mut course[stretch.clone()]).collect();
+            self.filter.apply(&mut own);
+        }
     }
 
-    /// The kept rows of a course as it was recorded; the course is spent.
-    pub fn reduce(&self, course: &mut [f64], room: &mut Vec<f64>) -> Vec<f64> {
-        self.filter(course, room);
-        self.rows.iter().map(|row| course[*row]).collect()
+    /// The kept rows of courses as they were recorded.
+    pub fn reduce(&self, mut courses: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        self.filter(&mut courses);
+        courses.into_iter().map(|course| self.rows.iter().map(|row| course[*row]).collect()).collect()
     }
 
     /// Kept rows of `width` courses that `write` makes for a range of rows, column after column (each as long as the range): the memory
     /// is that of a block.
     pub fn reduce_blocks(&self, width: usize, mut write: impl FnMut(Range<usize>, &mut [f64])) -> Vec<Vec<f64>> {
         let mut kept = vec![Vec::with_capacity(self.rows.len()); width];
-        let (mut block, mut room, mut next) = (Vec::new(), Vec::new(), 0);
+        let (mut block, mut next) = (Vec::new(), 0);
         for stretch in &self.stretches {
             for start in stretch.clone().step_by(BLOCK) {
                 let end = (start + BLOCK).min(stretch.end);
@@ -79,8 +82,9 @@ impl Reduction {
                 block.resize(width * long, 0.0);
                 write(wide.clone(), &mut block);
                 let last = next + self.rows[next..].partition_point(|row| *row < end);
-                for (course, kept) in block.chunks_exact_mut(long).zip(&mut kept) {
-                    self.filter.apply(course, &mut room);
+                let mut courses: Vec<&mut [f64]> = block.chunks_exact_mut(long).collect();
+                self.filter.apply(&mut courses);
+                for (course, kept) in courses.iter().zip(&mut kept) {
                     kept.extend(self.rows[next..last].iter().map(|row| course[row - wide.start]));
                 }
                 next = last;

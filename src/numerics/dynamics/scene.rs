@@ -49,7 +49,6 @@ impl<'a> DynamicScene<'a> {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);
         let filter = ZeroPhase::new(clock.rate, (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate));
-        let mut room = Vec::new();
         let mut scene = Self {
             arm,
             rate: clock.rate,
@@ -65,10 +64,11 @@ impl<'a> DynamicScene<'a> {
             friction_lead: 0.0,
             declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
         };
-        for joint in 0..n {
-            for stretch in &clock.stretches {
-                let course = &mut scene.position[joint][stretch.clone()];
-                filter.apply(course, &mut room);
+        for stretch in &clock.stretches {
+            let mut courses: Vec<&mut [f64]> = scene.position.iter_mut().map(|course| &mut course[stretch.clone()]).collect();
+            filter.apply(&mut courses);
+            for joint in 0..n {
+                let course = &scene.position[joint][stretch.clone()];
                 let velocity = &mut scene.velocity[joint][stretch.clone()];
                 derivatives(course, clock.rate, velocity, &mut scene.acceleration[joint][stretch.clone()]);
             }

@@ -68,14 +68,13 @@ impl FrictionFit {
     /// Of the rows that count and the torques as they are at present.
     pub fn new(problem: &TorqueProblem) -> Self {
         let rows: Vec<usize> = problem.runs(false).iter().flat_map(Clone::clone).collect();
-        let mut room = Vec::new();
-        let mut of = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
-            let velocity = problem.reduction.reduce(&mut problem.scene.velocity[joint].clone(), &mut room);
-            let velocity = rows.iter().map(|row| velocity[*row]).collect();
+        let velocities = problem.reduction.reduce(problem.scene.velocity.clone());
+        let of = |(joint, inertial): (usize, Vec<Vec<f64>>)| {
+            let velocity = rows.iter().map(|row| velocities[joint][*row]).collect();
             let columns: Vec<Vec<f64>> = inertial.into_iter().chain([velocity, vec![1.0; rows.len()]]).collect();
             JointFit::new(&columns)
         };
-        let joints = problem.base_courses(&rows).into_iter().enumerate().map(|one| of(one)).collect();
+        let joints = problem.base_courses(&rows).into_iter().enumerate().map(of).collect();
         let mut fit = Self { rows, joints };
         fit.take(&problem.measured);
         fit
@@ -95,19 +94,27 @@ impl FrictionFit {
 
     /// Logarithm of the mean square that is left at each joint as friction turns at present.
     pub fn left(&self, problem: &TorqueProblem) -> Vec<f64> {
-        (0..self.joints.len()).map(|joint| self.left_at(problem, joint)).collect()
+        let signs = problem.reduction.reduce((0..self.joints.len()).map(|joint| signs(problem, joint)).collect());
+        self.joints.iter().zip(&signs).map(|(fit, sign)| self.left_by(fit, sign)).collect()
     }
 
     /// At one joint.
     fn left_at(&self, problem: &TorqueProblem, joint: usize) -> f64 {
-        let mut signs: Vec<f64> = (0..problem.scene.rows()).map(|row| problem.scene.direction(joint, row)).collect();
-        let reduced = problem.reduction.reduce(&mut signs, &mut Vec::new());
-        let fit = &self.joints[joint];
-        let own = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| reduced[*row]));
+        let sign = problem.reduction.reduce(vec![signs(problem, joint)]);
+        self.left_by(&self.joints[joint], &sign[0])
+    }
+
+    fn left_by(&self, fit: &JointFit, sign: &[f64]) -> f64 {
+        let own = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|row| sign[*row]));
         let apart = fit.apart(&own);
         let gain = apart.dot(&fit.left).powi(2) / (apart.norm_squared() + RIDGE * own.norm_squared() + f64::MIN_POSITIVE);
         ((fit.left.norm_squared() - gain) / self.rows.len().max(1) as f64 + f64::MIN_POSITIVE).ln()
     }
+}
+
+/// How friction turns at a joint at present, all recorded rows.
+fn signs(problem: &TorqueProblem, joint: usize) -> Vec<f64> {
+    (0..problem.scene.rows()).map(|row| problem.scene.direction(joint, row)).collect()
 }
 
 impl JointFit {

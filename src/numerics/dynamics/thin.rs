@@ -191,21 +191,17 @@ impl Thinner {
         let chosen: Vec<usize> = (self.next - self.begun..known).step_by(self.plan.every).collect();
         if !chosen.is_empty() {
             let number = self.stretches.len() as u32 + 1;
-            let (n, mut room) = (self.stretch.joints, Vec::new());
-            let mut thinned = |values: &[f64]| -> Vec<f64> {
-                let mut out = vec![0.0; chosen.len() * n];
-                for joint in 0..n {
-                    let mut course = column(values, n, joint);
-                    self.filter.apply(&mut course, &mut room);
-                    chosen.iter().enumerate().for_each(|(at, row)| out[at * n + joint] = course[*row]);
-                }
-                out
+            let n = self.stretch.joints;
+            let thinned = |values: &[f64]| -> Vec<f64> {
+                let mut courses: Vec<Vec<f64>> = (0..n).map(|joint| column(values, n, joint)).collect();
+                self.filter.apply(&mut courses);
+                chosen.iter().flat_map(|row| courses.iter().map(|course| course[*row])).collect()
             };
             let stretch = &self.stretch;
             let block = TorqueRecording {
                 time: chosen.iter().map(|row| stretch.time[*row]).collect(),
                 position: thinned(&stretch.position),
-                velocity: stretch.velocity.as_deref().map(&mut thinned),
+                velocity: stretch.velocity.as_deref().map(thinned),
                 torque: thinned(&stretch.torque),
                 temperature: stretch.temperature.as_ref().map(|all| chosen.iter().map(|row| all[*row]).collect()),
                 trajectory: vec![number; chosen.len()],

@@ -36,7 +36,9 @@ pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Opti
                 let mut placed = model.place(&out, *row, &mut scratch);
                 let error = kind.residual(&out, *row, &placed).map(|(error, _)| error).filter(|error| error.norm() > CLOSED);
                 let closing = kind.closing(&out, *row, &placed);
-                let Some(step) = closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error)) else {
+                let Some(step) =
+                    closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error.first_three()))
+                else {
                     break;
                 };
                 let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];

@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::term::ObservationTerm;
 use super::triangle::Triangle;
 use crate::observation::KINDS;
-use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 /// A direction in which a pose alone decides has nothing left to show its error by: its share is capped here.
@@ -23,37 +23,43 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
     for (j, parameter) in free.iter().enumerate() {
         column[*parameter] = j;
     }
-    let lines: Vec<Vec<f64>> = poses
-        .par_iter()
-        .map_init(
-            || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
-            |(scratch, jacobian), pose| {
-                let (mut errors, mut visible) = (Vec::new(), Vec::new());
-                for &row in pose {
-                    let mut placed = model.place(problem.data, row, scratch);
-                    for kind in KINDS {
-                        let Some((term, _)) = ObservationTerm::of(*kind, problem.data, row, &placed, problem.excess) else {
-                            continue;
-                        };
-                        let share = term.share();
-                        jacobian.fill(Vector3::zeros());
-                        term.derivatives(&mut placed, |parameter, derivative| {
-                            if let Some(sum) = jacobian.get_mut(column[parameter]) {
-                                *sum += derivative;
+    let lines: Vec<Vec<f64>> =
+        poses
+            .par_iter()
+            .map_init(
+                || (model.stack.scratch(&model.robot), Vec::new()),
+                |(scratch, jacobian), pose| {
+                    let (mut errors, mut visible) = (Vec::new(), Vec::new());
+                    for &row in pose {
+                        let mut placed = model.place(problem.data, row, scratch);
+                        for kind in KINDS {
+                            let Some((term, _)) = ObservationTerm::of(*kind, problem.data, row, &placed, problem.excess) else {
+                                continue;
+                            };
+                            let share = term.share();
+                            let height = kind.height();
+                            jacobian.clear();
+                            jacobian.resize(height * p, 0.0);
+                            term.derivatives(&mut placed, |parameter, derivative| {
+                                if column[parameter] < p {
+                                    let own = &mut jacobian[height * column[parameter]..][..derivative.len()];
+                                    own.iter_mut().zip(derivative).for_each(|(sum, value)| *sum += value);
+                                }
+                            });
+                            let error = term.error.times(share);
+                            for line in 0..height {
+                                errors.push(error.get(line).copied().unwrap_or_default());
+                                visible.extend((0..p).map(|k| {
+                                    (0..=k).map(|j| jacobian[height * j + line] * inverse.at(j, k)).sum::<f64>() * share
+                                }));
                             }
-                        });
-                        errors.extend((term.error * share).iter());
-                        visible.extend((0..p).map(|k| {
-                            let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse.at(j, k)).sum();
-                            seen * share
-                        }));
+                        }
                     }
-                }
-                let visible = DMatrix::from_fn(errors.len(), p, |line, k| visible[line / 3 * p + k][line % 3]);
-                influence(&visible, &DVector::from_vec(errors), inverse)
-            },
-        )
-        .collect();
+                    let visible = DMatrix::from_row_slice(errors.len(), p, &visible);
+                    influence(&visible, &DVector::from_vec(errors), inverse)
+                },
+            )
+            .collect();
     let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
     let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse.at(j, k) * weight }));
     triangle(p, lines.into_iter().chain(told))

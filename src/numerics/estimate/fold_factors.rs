@@ -134,7 +134,7 @@ impl<'a> NearbyFits<'a> {
             let placed = model.place(self.data, *row, &mut scratch);
             let terms = KINDS.iter().filter_map(|kind| ObservationTerm::of(*kind, self.data, *row, &placed, self.excess));
             for ((term, _), share) in terms.zip(&mut shares) {
-                square += (term.error * *share).norm_squared();
+                square += term.error.times(*share).norm_squared();
             }
             lengths.push(self.scale.of_placed(self.data, *row, &placed));
         }

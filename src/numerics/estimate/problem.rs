@@ -7,12 +7,11 @@ use crate::effect::PlacedRow;
 use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, kinds};
 use crate::robot::Measurements;
 use faer::Mat;
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
 const SPAN: usize = 1024;
-/// Rows whose derivatives are held at once: three lines each of some fifty columns stay in the processor's cache.
+/// Rows whose derivatives are held at once: three lines or so each of some fifty columns stay in the processor's cache.
 const CHUNK: usize = 256;
 
 /// What is fitted to what: residual rows (measured - predicted) / sigma with Huber's weights.
@@ -85,8 +84,9 @@ impl Problem<'_> {
     fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
         let mut scratch = model.stack.scratch(&model.robot);
         let kinds = kinds(self.data);
-        // Three lines for each kind, whatever a row has of it.
-        let lines_of_row = 3 * kinds.len();
+        // A block of lines for each kind, whatever a row has of it.
+        let blocks: Vec<usize> = kinds.iter().map(|kind| kind.height()).collect();
+        let lines_of_row: usize = blocks.iter().sum();
         let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
         let (mut volume, mut pull) = (0.0, vec![0.0; p]);
@@ -97,17 +97,17 @@ impl Problem<'_> {
                 let share = term.share();
                 term.derivatives(placed, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
-                        let derivative = derivative * share;
-                        add(&mut lines[j][first..first + 3], &derivative);
+                        add(&mut lines[j][first..], derivative, share);
                     }
                 });
-                add(&mut lines[p][first..first + 3], &(term.error * share));
+                add(&mut lines[p][first..], &term.error, share);
             };
             for (i, &row) in chunk.iter().enumerate() {
                 let mut placed = model.place(self.data, row, &mut scratch);
-                for (k, kind) in kinds.iter().enumerate() {
+                let mut first = lines_of_row * i;
+                for (kind, height) in kinds.iter().zip(&blocks) {
                     if let Some((term, residual)) = ObservationTerm::of(*kind, self.data, row, &placed, self.excess) {
-                        write(lines_of_row * i + 3 * k, term, &mut placed);
+                        write(first, term, &mut placed);
                         residuals.push(residual);
                         if let Some(closing) = kind.closing(self.data, row, &placed) {
                             let own = placed.log_volume(&closing, |parameter, change| {
@@ -116,6 +116,7 @@ impl Problem<'_> {
                             volume += own.unwrap_or_default();
                         }
                     }
+                    first += height;
                 }
             }
             tall.absorb(height);
@@ -135,10 +136,8 @@ fn rms(residuals: &[Residual]) -> f64 {
     (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
 }
 
-fn add(to: &mut [f64], value: &Vector3<f64>) {
-    to[0] += value.x;
-    to[1] += value.y;
-    to[2] += value.z;
+fn add(to: &mut [f64], values: &[f64], share: f64) {
+    to[..values.len()].iter_mut().zip(values).for_each(|(to, value)| *to += value * share);
 }
 
 /// What a thread makes of its rows.

@@ -31,7 +31,7 @@ pub fn reseated(model: &Model, data: &Measurements, rows: &[usize], sigma: f64) 
     for row in rows {
         let placed = model.place(data, *row, &mut scratch);
         if let Some((error, _)) = socket.residual(data, *row, &placed) {
-            let off = placed.orientation().tr_mul(&error);
+            let off = placed.orientation().tr_mul(&error.first_three());
             seen.push((*row, off * (CUT * sigma / off.norm().max(CUT * sigma))));
         }
     }

@@ -1,6 +1,6 @@
 //! Distances of a target from an anchor (draw-wire, ballbar) whose place is estimated too.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::{Anchor, Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -52,11 +52,11 @@ impl MeasurementKind for Distance {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let reading = self.reading(data, row)?;
         let (along, length) = self.along(data, row, placed)?;
         let joints = data.spread.as_ref().map_or(0.0, |all| along.dot(&(all[row] * along)));
-        Some((Vector3::new(reading.values[0] - length, 0.0, 0.0), reading.sigma * reading.sigma + joints))
+        Some((Numbers::new([reading.values[0] - length]), reading.sigma * reading.sigma + joints))
     }
 
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {

@@ -3,7 +3,7 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
@@ -48,11 +48,11 @@ impl MeasurementKind for Inclination {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let reading = self.reading(data, row)?;
         let rotation = placed.orientation();
         let left = |axis: usize| reading.values[axis] - rotation[(2, axis)].clamp(-1.0, 1.0).asin();
-        Some((Vector3::new(left(0), left(1), 0.0), reading.sigma * reading.sigma))
+        Some((Numbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
     }
 
     /// A rotation w changes up . R e by w . (R e x up), and the angle by as much over its cosine, the length of R e x up.

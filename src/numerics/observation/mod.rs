@@ -5,6 +5,7 @@
 
 mod distance;
 mod inclination;
+mod numbers;
 mod orientation;
 mod planar;
 mod plane;
@@ -17,6 +18,7 @@ mod weight;
 pub use crate::robot::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
+pub use numbers::{Numbers, WIDEST};
 pub use orientation::Orientation;
 pub use planar::Planar;
 pub use plane::PlaneKind;
@@ -65,7 +67,7 @@ pub struct KindDescription {
     pub word: &'static str,
     /// Whether it measures lengths or angles.
     pub dimension: Dimension,
-    /// Values of a row.
+    /// Numbers of a row, [`WIDEST`] at most.
     pub axes: usize,
     /// In the recording.
     pub columns: &'static [DeclaredColumn],
@@ -91,10 +93,12 @@ pub struct Rank {
 }
 
 /// What of a target's motion a kind sees, in standard deviations: of the point, the orientation, the vector from the anchor.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum Sensitivity {
     /// Derivatives are those of the point.
     Point(Weight),
+    /// Derivatives are those of the point along a vector for each number, of which there may be more than three.
+    Lines(Vec<Vector3<f64>>),
     /// Derivatives are those of the rotation of the target.
     Rotation(Weight),
     /// Derivatives are those of the vector from the anchor, which stands here.
@@ -102,21 +106,36 @@ pub enum Sensitivity {
 }
 
 impl Sensitivity {
-    /// Derivative of what was measured by a parameter that acts along a direction, in standard deviations.
-    pub fn along(&self, motion: &PointMotion, direction: &Direction) -> Vector3<f64> {
+    /// Hands `take` the derivative of each number by a parameter that acts along a direction, in standard deviations: as many as the
+    /// kind has, or three of narrower ones, zero beyond.
+    pub fn along<T>(&self, motion: &PointMotion, direction: &Direction, take: impl FnOnce(&[f64]) -> T) -> T {
         match self {
-            Self::Point(weight) => weight.apply(&motion.point_along(direction)),
-            Self::Rotation(weight) => weight.apply(&motion.turn_along(direction)),
-            Self::FromAnchor(weight, reach) => weight.apply(&motion.from_anchor_along(direction, reach)),
+            Self::Point(weight) => take(weight.apply(&motion.point_along(direction)).as_slice()),
+            Self::Lines(lines) => {
+                let velocity = motion.point_along(direction);
+                take(&lines.iter().map(|line| line.dot(&velocity)).collect::<Vec<f64>>())
+            }
+            Self::Rotation(weight) => take(weight.apply(&motion.turn_along(direction)).as_slice()),
+            Self::FromAnchor(weight, reach) => take(weight.apply(&motion.from_anchor_along(direction, reach)).as_slice()),
         }
     }
 
-    /// Derivatives of what was measured by every parameter, in standard deviations, through `emit(parameter, derivative)`.
-    pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    /// Derivatives of what was measured by every parameter, in standard deviations, through `emit(parameter, derivatives)`, of each
+    /// number as [`Sensitivity::along`] has them.
+    pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, &[f64])) {
         match self {
-            Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity))),
-            Self::Rotation(weight) => placed.rotations(|k, rotation| emit(k, weight.apply(&rotation))),
-            Self::FromAnchor(weight, reach) => placed.partials_from_anchor(reach, |k, velocity| emit(k, weight.apply(&velocity))),
+            Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity).as_slice())),
+            Self::Lines(lines) => {
+                let mut seen = vec![0.0; lines.len()];
+                placed.partials(|k, velocity| {
+                    seen.iter_mut().zip(lines).for_each(|(seen, line)| *seen = line.dot(&velocity));
+                    emit(k, &seen);
+                });
+            }
+            Self::Rotation(weight) => placed.rotations(|k, rotation| emit(k, weight.apply(&rotation).as_slice())),
+            Self::FromAnchor(weight, reach) => {
+                placed.partials_from_anchor(reach, |k, velocity| emit(k, weight.apply(&velocity).as_slice()));
+            }
         }
     }
 }
@@ -126,9 +145,9 @@ pub trait MeasurementKind: Sync {
     /// What it is, in words and numbers.
     fn about(&self) -> &'static KindDescription;
 
-    /// Measured - predicted (m or rad, zero on lines without a value) and the variance of each value; `None` where the row measured
-    /// none, or the robot lacks what it was measured from.
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)>;
+    /// Measured - predicted (m or rad, zero where a number was not measured) and the variance of each number; `None` where the row
+    /// measured none, or the robot lacks what it was measured from.
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)>;
 
     /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity;
@@ -153,9 +172,15 @@ pub trait MeasurementKind: Sync {
         data.reading_spread.get(self.about().name).map_or(0.0, |all| all[row])
     }
 
-    /// Lines of its residual that hold what a row measured, ascending.
+    /// Numbers of its residual, from 0, that a row measured, ascending.
     fn lines(&self, data: &Measurements, row: usize) -> &'static [usize] {
-        &[0, 1, 2][..self.axes(data, row)]
+        const ALL: [usize; WIDEST] = [0, 1, 2, 3, 4, 5, 6, 7];
+        &ALL[..self.axes(data, row)]
+    }
+
+    /// Lines that it has in a block of rows: of narrow kinds three, as a motion has.
+    fn height(&self) -> usize {
+        self.about().axes.max(3)
     }
 
     /// Length of one sigma of what a row measured, m or rad.
@@ -170,7 +195,7 @@ pub trait MeasurementKind: Sync {
     }
 
     /// The error (m or rad) in standard deviations of the instrument alone, squared and summed.
-    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
+    fn stated(&self, data: &Measurements, row: usize, error: &Numbers) -> f64 {
         self.reading(data, row).map_or(0.0, |reading| error.norm_squared() / (reading.sigma * reading.sigma))
     }
 

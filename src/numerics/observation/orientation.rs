@@ -1,8 +1,8 @@
 //! Orientations: how a target is turned in the tracker's frame; kept as a rotation matrix, its residual is a rotation vector.
 
 use super::{
-    ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity,
-    Weight,
+    ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank,
+    Sensitivity, Weight,
 };
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, ONE_AND_A_HALF_TURNS};
@@ -112,10 +112,10 @@ impl MeasurementKind for Orientation {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let (measured, sigma) = self.measured(data, row)?;
         let off = measured * placed.orientation().transpose();
-        Some((Pose::new(off, Vector3::zeros()).rotation_vector(), sigma * sigma))
+        Some((Pose::new(off, Vector3::zeros()).rotation_vector().into(), sigma * sigma))
     }
 
     fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {

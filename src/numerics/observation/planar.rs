@@ -3,7 +3,7 @@
 //! u = -y / x to the right, v = -z / x downwards: the frame's x axis is the optical axis, z is up. They are pixels from the principal point
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -66,10 +66,10 @@ impl MeasurementKind for Planar {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let (reading, point) = (self.reading(data, row)?, CAMERA * placed.point);
         let left = |axis: usize| reading.values[axis] - point[axis] / point.z.max(NEAREST);
-        Some((Vector3::new(left(0), left(1), 0.0), reading.sigma * reading.sigma))
+        Some((Numbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
     }
 
     /// Of a quotient: d(a / c) = (da - a / c dc) / c.

@@ -1,7 +1,7 @@
 //! Planes: the target touches one (a table, a cube's face, a dial gauge at zero), which is estimated too; nothing is read but the joints.
 
 use super::socket::touches;
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -51,11 +51,11 @@ impl MeasurementKind for PlaneKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let (reach, normal) = self.touch(data, row, placed)?;
         let sigma = self.reading(data, row)?.sigma;
         let joints = data.spread.as_ref().map_or(0.0, |all| normal.dot(&(all[row] * normal)));
-        Some((Vector3::new(-normal.dot(&reach), 0.0, 0.0), sigma * sigma + joints))
+        Some((Numbers::new([-normal.dot(&reach)]), sigma * sigma + joints))
     }
 
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {

@@ -1,10 +1,9 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Length;
-use nalgebra::Vector3;
 
 /// The kind `point`.
 #[derive(Debug, Clone, Copy)]
@@ -68,9 +67,9 @@ impl MeasurementKind for PointKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         // Each axis has a variance of its own: see `weight`.
-        (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point), f64::NAN))
+        (data.points.axes(row) > 0).then(|| (data.points.residual(row, &placed.point).into(), f64::NAN))
     }
 
     fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
@@ -107,8 +106,8 @@ impl MeasurementKind for PointKind {
         (data.points.axes(row) > 0).then(|| data.points.sigma[row].map(finite).norm())
     }
 
-    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
-        error.component_div(&data.points.sigma[row]).norm_squared()
+    fn stated(&self, data: &Measurements, row: usize, error: &Numbers) -> f64 {
+        error.iter().zip(&data.points.sigma[row]).map(|(error, sigma)| (error / sigma) * (error / sigma)).sum()
     }
 
     /// Every recording has its columns.

@@ -1,9 +1,8 @@
 //! What is left of what a row measured of one kind.
 
-use super::{Dimension, MeasurementKind, Sensitivity, Weight};
+use super::{Dimension, MeasurementKind, Numbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
-use nalgebra::Vector3;
 
 /// Standard deviation that rows show beyond their own noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -31,8 +30,8 @@ pub struct Residual {
     pub kind: &'static dyn MeasurementKind,
     /// Of the recording.
     pub row: usize,
-    /// m or rad; on the first `axes` lines or, of a point, on those measured.
-    pub error: Vector3<f64>,
+    /// m or rad, as many numbers as the kind has; 0 where one was not measured.
+    pub error: Numbers,
     /// How many values were measured.
     pub axes: usize,
     /// Of each value, where the kind has one for all.
@@ -57,8 +56,8 @@ impl Residual {
     }
 
     /// The error in standard deviations.
-    pub fn whitened(&self, data: &Measurements, excess: f64) -> Vector3<f64> {
-        self.weight(data, excess).apply(&self.error)
+    pub fn whitened(&self, data: &Measurements, excess: f64) -> Numbers {
+        self.weight(data, excess).whiten(&self.error)
     }
 
     /// What the kind sees of the target's motion, in standard deviations by `weight`.

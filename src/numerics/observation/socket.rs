@@ -1,6 +1,6 @@
 //! Sockets: a ball on the tool lies in one, whose centre is estimated too; nothing is read but the joints.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -63,10 +63,10 @@ impl MeasurementKind for SocketKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let reading = self.reading(data, row)?;
         placed.anchor_shape(reading.anchor).filter(|shape| *shape == Shape::Point)?;
-        Some((-placed.from_anchor(reading.anchor)?, reading.sigma * reading.sigma))
+        Some(((-placed.from_anchor(reading.anchor)?).into(), reading.sigma * reading.sigma))
     }
 
     fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {

@@ -2,7 +2,7 @@
 //! is read but the joints.
 
 use super::socket::touches;
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Numbers, Part, Rank, Sensitivity, Weight};
 use crate::effect::{Closing, PlacedRow};
 use crate::robot::{Anchor, Measurements, RobotModel, Shape};
 use crate::spatial::Pose;
@@ -55,11 +55,11 @@ impl MeasurementKind for SphereKind {
         &ABOUT
     }
 
-    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Numbers, f64)> {
         let (reach, radius) = self.touch(data, row, placed)?;
         let (sigma, along) = (self.reading(data, row)?.sigma, reach.normalize());
         let joints = data.spread.as_ref().map_or(0.0, |all| along.dot(&(all[row] * along)));
-        Some((Vector3::new(radius - reach.norm(), 0.0, 0.0), sigma * sigma + joints))
+        Some((Numbers::new([radius - reach.norm()]), sigma * sigma + joints))
     }
 
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {

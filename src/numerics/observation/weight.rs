@@ -1,11 +1,14 @@
 //! A linear map of errors or derivatives, above all into standard deviations.
 
+use super::Numbers;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
 /// Turns an error or a derivative (m or rad, three axes) into standard deviations.
 #[derive(Debug, Clone, Copy)]
 pub enum Weight {
+    /// The same inverse standard deviation of all numbers, however many.
+    Uniform(f64),
     /// Inverse standard deviation per axis; zero where not measured.
     Axes(Vector3<f64>),
     /// A matrix, e.g. the inverse of the covariance's Cholesky factor.
@@ -17,7 +20,7 @@ pub enum Weight {
 impl Weight {
     /// The same standard deviation of all axes.
     pub fn uniform(sigma: f64) -> Self {
-        Self::Axes(Vector3::repeat(1.0 / sigma))
+        Self::Uniform(1.0 / sigma)
     }
 
     /// Of a row's point with `excess` (m per axis) beside its own noise.
@@ -40,9 +43,18 @@ impl Weight {
         }
     }
 
-    /// The residual in standard deviations, axis by axis.
+    /// A residual in standard deviations.
+    pub fn whiten(&self, error: &Numbers) -> Numbers {
+        match self {
+            Self::Uniform(weight) => error.times(*weight),
+            Self::Axes(_) | Self::Full(_) | Self::Along(_) => error.with_first_three(&self.apply(&error.first_three())),
+        }
+    }
+
+    /// The same of a motion along three axes.
     pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
         match self {
+            Self::Uniform(weight) => error * *weight,
             Self::Axes(weight) => error.component_mul(weight),
             Self::Full(inverse) => inverse * error,
             Self::Along(direction) => Vector3::new(direction.dot(error), 0.0, 0.0),

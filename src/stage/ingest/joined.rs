@@ -67,6 +67,10 @@ impl JoinDecisions<'_> {
     }
     /// How much later (s) than its joints the point of a row was measured.
     pub(super) fn later(&self, moving: usize, row: &RecordedRow, decision: &FileDecision) -> Option<f64> {
+        // Asked of every row.
+        if !matches!(self.settings.join, Some(Join::Time { .. })) {
+            return None;
+        }
         let values = || KINDS.iter().flat_map(|kind| kind.columns(Part::Value));
         let files = &self.settings.files;
         let point = files.iter().position(|file| values().any(|column| file.has(column.setting)))?;

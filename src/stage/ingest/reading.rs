@@ -11,6 +11,7 @@ use super::{lines, listing, parquet, workbook};
 use crate::error::{Error, Result, counted};
 use crate::raw;
 use crate::stage::{Context, OpenedInput};
+use crate::table::RejectedRow;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -92,6 +93,17 @@ impl<'a> OpenedFile<'a> {
     /// The slots that the file fills, and what it lacks.
     pub(super) fn binding(&self) -> &super::bind::Binding {
         &self.reader.binding
+    }
+    /// The present row as one that is not used, of the file that tables call `name`.
+    pub(super) fn rejected(&self, name: &str, refusal: RowRefusal) -> RejectedRow {
+        RejectedRow {
+            file: name.into(),
+            line: self.row.line as i64,
+            point_id: (!self.row.id.is_empty()).then(|| self.row.id.clone()),
+            reason: refusal.reason.word().into(),
+            detail: refusal.detail,
+            text: self.record.shown(),
+        }
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {

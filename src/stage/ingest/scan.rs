@@ -144,16 +144,50 @@ impl Scan {
     }
 }
 
-/// Reads file `index` of the settings once.
-pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &RobotJoints, context: &Context) -> Result<Scan> {
+/// A file below its header, with its size in bytes where that is known.
+pub(super) struct ScannedFile<'a> {
+    reading: OpenedFile<'a>,
+    size: Option<u64>,
+}
+
+impl ScannedFile<'_> {
+    /// What is known before the first row.
+    pub(super) fn beginning(&self) -> Scan {
+        Scan::new(self.reading.label.clone(), self.reading.binding().slots(), None)
+    }
+}
+
+/// Opens a file and says what is odd about it.
+pub(super) fn open<'a>(
+    settings: &Ingest,
+    layout: &FileLayout,
+    arm: &'a RobotJoints,
+    context: &Context,
+) -> Result<ScannedFile<'a>> {
     let source = context.services.open(&layout.file)?;
     let size = source.size;
-    let mut reading = OpenedFile::open(source, layout, arm, settings.limits)?;
+    let reading = OpenedFile::open(source, layout, arm, settings.limits)?;
+    for remark in reading.remarks() {
+        context.services.note(format!("{}: {remark}", reading.label));
+    }
+    Ok(ScannedFile { reading, size })
+}
+
+/// Whoever sees each row with what was judged of it.
+pub(super) type RowWatch<'a> = dyn FnMut(&OpenedFile, &Result<(), RowRefusal>) + 'a;
+
+/// Reads file `index` of the settings once.
+pub(super) fn scan(
+    settings: &Ingest,
+    index: usize,
+    ScannedFile { mut reading, size }: ScannedFile,
+    arm: &RobotJoints,
+    context: &Context,
+    watch: &mut RowWatch,
+) -> Result<Scan> {
+    let layout = &settings.files[index];
     let label = reading.label.clone();
     context.services.begin(&format!("reading {label}"), size, "bytes");
-    for remark in reading.remarks() {
-        context.services.note(format!("{label}: {remark}"));
-    }
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
     let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
@@ -170,7 +204,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
     let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    let mut pace = ProgressCounter::new(context);
+    let (mut pace, mut contents) = (ProgressCounter::new(context), ContentHasher::default());
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
         if let Some((joint, angle)) = row.turned {
@@ -178,14 +212,16 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         }
         match &judged {
             Ok(()) => {
-                if keyed && !row.id.is_empty() {
-                    scan.keys.push(key(row, index, &scan.label)?);
+                let identified = keyed && !row.id.is_empty();
+                let content = if identified || measured.is_some() { contents.of(row) } else { 0 };
+                if identified {
+                    scan.keys.push(key(row, content, index, &scan.label)?);
                 }
                 if matches!(settings.join, Some(Join::Id {})) && scan.ids.len() < EXAMPLES {
                     scan.ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(hasher) = &mut measured {
-                    hasher.update(&row.number.to_le_bytes()).update(&content(row).to_le_bytes());
+                    hasher.update(&row.number.to_le_bytes()).update(&content.to_le_bytes());
                 }
                 if timed {
                     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
@@ -207,6 +243,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         if !reading.record.is_blank(0) {
             scan.last = row.number;
         }
+        watch(&reading, &judged);
         pace.row(reading.bytes());
     }
     context.services.advance(reading.bytes(), "");
@@ -241,30 +278,46 @@ fn narrow(number: u64, label: &str) -> Result<u32> {
     u32::try_from(number).map_err(|_| Error::data(label, "more than 4294967295 rows"))
 }
 
-fn key(row: &RecordedRow, file: usize, label: &str) -> Result<IdFingerprint> {
-    let digest = blake3::hash(row.id.as_bytes());
+/// 96 bits of an id's hash.
+fn hash_of_id(id: &str) -> (u64, u32) {
+    let digest = blake3::hash(id.as_bytes());
     let mut bytes = digest.as_bytes().iter().copied();
     let hash = first_eight(&mut bytes);
-    let check = bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte));
-    let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
-    Ok(IdFingerprint { hash, check, file: file as u32, number, line, content: content(row) })
+    (hash, bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte)))
 }
 
-/// Hash of the numbers and texts of a row.
-fn content(row: &RecordedRow) -> u64 {
-    let mut hasher = blake3::Hasher::new();
-    // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
-    for (place, value) in (0u64..).zip(&row.values).filter(|(_, value)| !value.is_nan()) {
-        hasher.update(&place.to_le_bytes()).update(&value.to_bits().to_le_bytes());
+fn key(row: &RecordedRow, content: u64, file: usize, label: &str) -> Result<IdFingerprint> {
+    let (hash, check) = hash_of_id(&row.id);
+    let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
+    Ok(IdFingerprint { hash, check, file: file as u32, number, line, content })
+}
+
+/// Makes hashes of what rows say; its room is used again.
+#[derive(Default)]
+struct ContentHasher {
+    bytes: Vec<u8>,
+}
+
+impl ContentHasher {
+    /// Hash of the numbers, points and texts of a row.
+    fn of(&mut self, row: &RecordedRow) -> u64 {
+        self.bytes.clear();
+        // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
+        for (place, value) in row.values.iter().enumerate() {
+            if !value.is_nan() {
+                self.bytes.extend_from_slice(&(place as u64).to_le_bytes());
+                self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
+            }
+        }
+        for value in row.points.iter().flatten() {
+            self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
+        }
+        for text in &row.texts {
+            self.bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
+            self.bytes.extend_from_slice(text.as_bytes());
+        }
+        first_eight(&mut blake3::hash(&self.bytes).as_bytes().iter().copied())
     }
-    for value in row.points.iter().flatten() {
-        hasher.update(&value.to_bits().to_le_bytes());
-    }
-    for text in &row.texts {
-        hasher.update(&(text.len() as u64).to_le_bytes());
-        hasher.update(text.as_bytes());
-    }
-    first_eight(&mut hasher.finalize().as_bytes().iter().copied())
 }
 
 fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
@@ -272,6 +325,12 @@ fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
 }
 
 impl Scan {
+    /// A data row with an id; `keys` are sorted.
+    pub(super) fn row_of_id(&self, id: &str) -> Option<u32> {
+        let wanted = hash_of_id(id);
+        let at = self.keys.binary_search_by(|key| (key.hash, key.check).cmp(&wanted)).ok()?;
+        Some(self.keys[at].number)
+    }
     fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {

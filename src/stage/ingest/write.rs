@@ -13,7 +13,7 @@ use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
 use crate::stage::{Context, Sink, StreamedTable};
-use crate::table::{Recording, Rejected, RejectedRow, SIGMA_SOURCE, Table, recording_frame};
+use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, recording_frame};
 use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
@@ -30,7 +30,7 @@ pub(super) fn write(
     let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).take(one.leading()));
     let rows = rows.map(|(scan, decision)| verdict::accepted(scan, decision)).sum();
     context.services.begin("writing the recording", Some(rows), "rows");
-    let mut recording = Chunks::new(decided, context)?;
+    let mut recording = RecordingChunks::new(decided, context)?;
     let mut rejected = Rejections::new(names, context)?;
     for (one, gap) in decided.iter().zip(std::iter::once(None).chain(gaps.iter().map(Some))) {
         gap.into_iter().for_each(|gap| recording.rows.begin(*gap));
@@ -41,11 +41,12 @@ pub(super) fn write(
     Ok((recording.finish(context)?, rejected.finish()?))
 }
 
-fn file(
+/// Reads file `index` once more: rejected rows of it, and used ones where `recording` takes them.
+pub(super) fn file(
     decided: &JoinDecisions,
     index: usize,
     layout: &FileLayout,
-    mut recording: Option<&mut Chunks>,
+    mut recording: Option<&mut RecordingChunks>,
     rejected: &mut Rejections,
     context: &Context,
 ) -> Result<()> {
@@ -67,14 +68,7 @@ fn file(
                     pace.row(chunks.written);
                 }
             }
-            Err(refusal) => rejected.push(RejectedRow {
-                file: name.clone(),
-                line: reading.row.line as i64,
-                point_id: (!reading.row.id.is_empty()).then(|| reading.row.id.clone()),
-                reason: refusal.reason.word().into(),
-                detail: refusal.detail,
-                text: reading.record.shown(),
-            })?,
+            Err(refusal) => rejected.push(reading.rejected(name, refusal))?,
         }
     }
     if let Some(chunks) = recording {
@@ -96,7 +90,7 @@ struct Stored {
 }
 
 /// The recording, chunk by chunk.
-struct Chunks<'a> {
+pub(super) struct RecordingChunks<'a> {
     sink: Box<dyn Sink + 'a>,
     sequence: Vec<i64>,
     ids: Vec<String>,
@@ -116,13 +110,13 @@ struct Chunks<'a> {
     rows: Continuation,
     written: u64,
     /// Data rows of the files before this one.
-    before: u64,
+    pub before: u64,
     /// The most targets of a wide row; 1 where there is none.
     widest: i64,
 }
 
-impl<'a> Chunks<'a> {
-    fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
+impl<'a> RecordingChunks<'a> {
+    pub(super) fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
         let [decided, ..] = all else { return Err(Error::Bug("nothing was read".into())) };
         let slots = &decided.arm.slots;
         let mut has = vec![false; slots.count];
@@ -178,7 +172,13 @@ impl<'a> Chunks<'a> {
                 .unwrap_or(1),
         })
     }
-    fn push(&mut self, row: &RecordedRow, index: usize, decision: &FileDecision, decided: &JoinDecisions) -> Result<()> {
+    pub(super) fn push(
+        &mut self,
+        row: &RecordedRow,
+        index: usize,
+        decision: &FileDecision,
+        decided: &JoinDecisions,
+    ) -> Result<()> {
         let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
         let (mut id, mut texts) = (&row.id, row.texts.iter().collect::<Vec<&String>>());
@@ -282,7 +282,7 @@ impl<'a> Chunks<'a> {
         self.numbers.iter_mut().for_each(|stored| stored.values.clear());
         self.sink.push(frame)
     }
-    fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
+    pub(super) fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
         if !self.sequence.is_empty() {
             self.flush()?;
         }

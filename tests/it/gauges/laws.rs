@@ -123,7 +123,7 @@ fn read() -> impl Iterator<Item = &'static dyn MeasurementKind> {
 fn residual(kind: &dyn MeasurementKind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
     let mut scratch = truth.stack.scratch(&truth.robot);
     let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
-    kind.residual(data, row, &placed).expect("measured").0
+    kind.residual(data, row, &placed).expect("measured").0.first_three()
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
             let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
             let mut partials = vec![Vector3::zeros(); model.x.len()];
             let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, derivative| partials[k] += derivative);
+            sensitivity.derivatives(&mut placed, |k, own| partials[k] += Vector3::from_column_slice(own));
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();

@@ -127,14 +127,14 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
             checked += 1;
             let mut partials = vec![Vector3::zeros(); model.x.len()];
             let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
-            sensitivity.derivatives(&mut placed, |k, derivative| partials[k] += derivative);
+            sensitivity.derivatives(&mut placed, |k, own| partials[k] += Vector3::from_column_slice(own));
             for (k, partial) in partials.iter().enumerate() {
                 let moved = |step: f64| {
                     let mut x = model.x.clone();
                     x[k] += step;
                     let mut scratch = model.stack.scratch(&model.robot);
                     let placed = model.stack.place(&model.robot, &data, row, &x, &mut scratch);
-                    kind.residual(&data, row, &placed).expect("measured").0
+                    kind.residual(&data, row, &placed).expect("measured").0.first_three()
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());

@@ -18,7 +18,7 @@ const STEPS: usize = 60;
 pub(super) struct JointSpread {
     /// Of the point, m2 per rad2.
     points: Vec<Matrix3<f64>>,
-    /// Of what rows measured beside points, on the lines of the kind's residual; zero where a row measured none.
+    /// Of what rows measured beside points, of the first three numbers of the kind; zero where a row measured none.
     others: Vec<(&'static dyn MeasurementKind, Vec<Matrix3<f64>>)>,
 }
 
@@ -67,7 +67,7 @@ impl JointSpread {
                 let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
                 left.extend(seen.map(|(residual, reading)| LeftBySpread {
                     kind: kind.about().name,
-                    error: residual.error,
+                    error: residual.error.first_three(),
                     fixed: Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
                         (true, true) => reading.sigma * reading.sigma,
                         (true, false) => 1.0,

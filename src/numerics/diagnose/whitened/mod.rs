@@ -12,7 +12,7 @@ use crate::effect::{
     Basis, Deflection, Direction, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
-use crate::observation::{MeasurementKind, Residual, kinds};
+use crate::observation::{MeasurementKind, Numbers, Residual, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use autocorrelated::AutocorrelatedNoise;
 use autocorrelated::Innovations;
@@ -54,10 +54,10 @@ impl<'a> WhitenedProblem<'a> {
             let seen = |kind: &&'static dyn MeasurementKind| {
                 let residual = Residual::of(*kind, data, *row, &placed)?;
                 let weight = residual.weight(data, 0.0);
-                let (error, lines) = (weight.apply(&residual.error), kind.lines(data, *row));
+                let (error, lines) = (weight.whiten(&residual.error), kind.lines(data, *row));
                 Some((SeenReading { kind: *kind, lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
             };
-            let seen: Vec<(SeenReading, Vector3<f64>)> = kinds.iter().filter_map(seen).collect();
+            let seen: Vec<(SeenReading, Numbers)> = kinds.iter().filter_map(seen).collect();
             let motion = if turns { EffectStack::target_motion } else { EffectStack::point_motion };
             (motion(&model.stack, &model.robot, data, *row, &model.x, scratch), seen)
         };
@@ -154,10 +154,12 @@ impl<'a> WhitenedProblem<'a> {
         &self.motions[row].by_joint
     }
 
-    /// How far each joint moves what a row (by its place) measured of a kind, in standard deviations per rad or m; none where it measured none.
+    /// How far each joint moves the first three numbers that a row (by its place) measured of a kind, in standard deviations per rad or m;
+    /// none where it measured none.
     pub fn reading_by_joint(&self, place: usize, kind: &str) -> Option<Vec<Vector3<f64>>> {
         let (_, reading) = self.readings.seen(place).find(|(_, reading)| reading.kind.about().name == kind)?;
-        let along = |joint| reading.sensitivity.along(&self.motions[place], &Direction::Joint(joint, 1.0));
+        let first_three = |own: &[f64]| Vector3::from_fn(|k, _| own.get(k).copied().unwrap_or_default());
+        let along = |joint| reading.sensitivity.along(&self.motions[place], &Direction::Joint(joint, 1.0), first_three);
         Some((0..self.robot.joints()).map(along).collect())
     }
 
@@ -193,10 +195,11 @@ impl<'a> WhitenedProblem<'a> {
             motion.deflect(self.robot, self.data, form, &zeros, &mut buffer);
             for (first, reading) in self.readings.seen(i) {
                 for (parameter, direction) in &buffer.partials {
-                    let derivative = reading.sensitivity.along(motion, direction);
-                    for (k, line) in reading.lines.iter().enumerate() {
-                        out[parameter * rows + first + k] += derivative[*line];
-                    }
+                    reading.sensitivity.along(motion, direction, |derivative| {
+                        for (k, line) in reading.lines.iter().enumerate() {
+                            out[parameter * rows + first + k] += derivative[*line];
+                        }
+                    });
                 }
             }
             let Some(currents) = &self.currents else { continue };

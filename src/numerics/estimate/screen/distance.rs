@@ -55,10 +55,10 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                 term.derivatives(&mut placed, |parameter, derivative| {
                     if column[parameter] < free.len() {
                         let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
-                        line.iter_mut().zip(derivative.iter()).for_each(|(value, d)| *value += d);
+                        line.iter_mut().zip(derivative).for_each(|(value, d)| *value += d);
                     }
                 });
-                terms.push((i, fitted[row], term.error));
+                terms.push((i, fitted[row], term.error.first_three()));
             }
             standings.push(LeaveOneOut {
                 predicted,
