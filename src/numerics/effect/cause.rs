@@ -198,8 +198,8 @@ pub const CAUSES: &[&dyn Cause] = &[
     &tracker_offset::TrackerOffset,
     &tracker_refraction::TrackerRefraction,
     &joint_log_lag::JointLogLag,
-    &wrong_point::OUTLIER,
-    &wrong_point::MISLABELLED_POINT,
+    &wrong_point::Outlier,
+    &wrong_point::MislabelledPoint,
     &unknown::Unknown,
 ];
 

@@ -2,32 +2,41 @@
 
 use super::{Cause, CauseDescription, names};
 
-/// A fault of single rows.
-pub struct WrongPoint(&'static CauseDescription);
+pub struct Outlier;
 
-/// Single wrong points.
-pub const OUTLIER: WrongPoint = WrongPoint(&CauseDescription {
-    name: names::OUTLIER,
-    place: "recording",
-    formula: "single wrong points",
-    size: "any",
-    confounded: "-",
-    needs: "-",
-});
-
-/// Points under each other's name.
-pub const MISLABELLED_POINT: WrongPoint = WrongPoint(&CauseDescription {
-    name: names::MISLABELLED_POINT,
-    place: "recording",
-    formula: "points that carry each other's name",
-    size: "any",
-    confounded: "-",
-    needs: "-",
-});
-
-impl Cause for WrongPoint {
+impl Cause for Outlier {
     fn about(&self) -> &'static CauseDescription {
-        self.0
+        &CauseDescription {
+            name: names::OUTLIER,
+            place: "recording",
+            formula: "single wrong points",
+            size: "any",
+            confounded: "-",
+            needs: "-",
+        }
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
+}
+
+pub struct MislabelledPoint;
+
+impl Cause for MislabelledPoint {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
+            name: names::MISLABELLED_POINT,
+            place: "recording",
+            formula: "points that carry each other's name",
+            size: "any",
+            confounded: "-",
+            needs: "-",
+        }
     }
 
     fn is_of_the_measurement(&self) -> bool {
