@@ -4,7 +4,7 @@ use super::place;
 use super::run_state::{self, RunState};
 use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
-use crate::stage::{Context, Input, Output, StoredTable};
+use crate::stage::{Context, InputTable, Output, StoredTable};
 use crate::store::frame::Frame;
 use crate::store::{Account, FinishedFile, PendingTable, PublishedTable, Store, TableRef};
 use std::any::Any;
@@ -91,7 +91,7 @@ impl StoredTable for LongTable {
     }
 }
 
-fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, Input)>>> {
+fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, InputTable)>>> {
     let stages = &state.plan.stages;
     let inputs = stages[index].inputs.iter();
     inputs
@@ -101,7 +101,7 @@ fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String
                 let tables = state.tables[origin.stage].as_ref();
                 let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
                 let table = run_state::table(tables, from, origin.port)?;
-                let input: Input = match input.port.chunked {
+                let input: InputTable = match input.port.chunked {
                     true => Box::new(LongTable { table: store.published(table)?, whole: OnceLock::new() }),
                     false => Box::new(store.load(table)?),
                 };

@@ -4,7 +4,7 @@ use super::plan::{InputFile, PlannedStage};
 use super::{Override, Plan, services, spec};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
-use crate::stage::{Context, Input, OpenedInput, Output, RawFile, Services, Sink, StageEntry};
+use crate::stage::{Context, InputTable, OpenedInput, Output, RawFile, Services, Sink, StageEntry};
 use crate::store::frame::Frame;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -65,11 +65,11 @@ pub fn faults_of_robots(file: &Path, overrides: &[Override], registry: &'static 
 }
 
 /// The tables that a stage reads, if those before it could give them all.
-fn frames(plan: &Plan, stage: &PlannedStage, tables: &[Option<Vec<Frame>>]) -> Option<Vec<Vec<(String, Input)>>> {
+fn frames(plan: &Plan, stage: &PlannedStage, tables: &[Option<Vec<Frame>>]) -> Option<Vec<Vec<(String, InputTable)>>> {
     let inputs = stage.inputs.iter().map(|input| {
         let frames = input.from.iter().map(|origin| {
             let frame = tables.get(origin.stage)?.as_ref()?.get(origin.port)?;
-            let input: Input = Box::new(frame.clone());
+            let input: InputTable = Box::new(frame.clone());
             Some((plan.stages.get(origin.stage)?.id.clone(), input))
         });
         frames.collect()

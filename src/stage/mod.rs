@@ -60,7 +60,7 @@ pub use report_torques::{ReportTorques, ReportTorquesReads, ReportTorquesWrites}
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
-pub use stored::{Chunks, Input, StoredTable};
+pub use stored::{Chunks, InputTable, StoredTable};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
@@ -104,7 +104,7 @@ pub trait PortValue: Sized {
     /// Whether it is read chunk by chunk.
     const CHUNKED: bool = false;
     /// The value from the tables that were wired to the port.
-    fn take(inputs: Vec<(String, Input)>) -> Result<Self>;
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self>;
 }
 
 /// A table together with the id of the stage that wrote it.
@@ -119,21 +119,21 @@ pub struct Labelled<T> {
 impl<T: Table> PortValue for T {
     const ARITY: Arity = Arity::One;
     const KIND: &'static str = T::KIND;
-    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
         T::from_frame(&inputs.first().expect("the plan wired this port").1.frame()?)
     }
 }
 impl<T: Table> PortValue for Option<T> {
     const ARITY: Arity = Arity::Optional;
     const KIND: &'static str = T::KIND;
-    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
         inputs.first().map(|(_, input)| T::from_frame(&input.frame()?)).transpose()
     }
 }
 impl<T: Table> PortValue for Vec<Labelled<T>> {
     const ARITY: Arity = Arity::Every;
     const KIND: &'static str = T::KIND;
-    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
         inputs.into_iter().map(|(stage, input)| Ok(Labelled { stage, table: T::from_frame(&input.frame()?)? })).collect()
     }
 }
@@ -143,7 +143,7 @@ pub trait Reads: Sized {
     /// In the order of the fields.
     fn ports() -> Vec<Port>;
     /// Takes the tables of each port, in the order of [`Reads::ports`].
-    fn take(inputs: Vec<Vec<(String, Input)>>) -> Result<Self>;
+    fn take(inputs: Vec<Vec<(String, InputTable)>>) -> Result<Self>;
 }
 
 /// The output ports of a stage.
@@ -175,7 +175,7 @@ macro_rules! reads {
                 vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY, chunked: <$ty as crate::stage::PortValue>::CHUNKED } ),* ]
             }
             #[allow(unused_mut, unused_variables)]
-            fn take(inputs: Vec<Vec<(String, crate::stage::Input)>>) -> crate::error::Result<Self> {
+            fn take(inputs: Vec<Vec<(String, crate::stage::InputTable)>>) -> crate::error::Result<Self> {
                 let mut inputs = inputs.into_iter();
                 Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(inputs.next().expect("one entry per port"))?, )* })
             }

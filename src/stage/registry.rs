@@ -1,6 +1,6 @@
 //! Stages without their types, so that a pipeline can hold any of them.
 
-use super::{Context, Input, Output, Port, RawFile, Reads, Stage, Writes};
+use super::{Context, InputTable, Output, Port, RawFile, Reads, Stage, Writes};
 use crate::error::{Fault, Result};
 use crate::yaml::{Node, Trouble, typed};
 use schemars::{Schema, SchemaGenerator};
@@ -18,9 +18,9 @@ pub trait ErasedStage: Send + Sync {
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
     /// As [`Stage::look`], with the tables of each input port where all are known.
-    fn look(&self, inputs: Option<Vec<Vec<(String, Input)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
+    fn look(&self, inputs: Option<Vec<Vec<(String, InputTable)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
     /// Takes the tables of each input port with the ids of the stages that wrote them.
-    fn run(&self, inputs: Vec<Vec<(String, Input)>>, context: &Context) -> Result<Vec<Output>>;
+    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context) -> Result<Vec<Output>>;
 }
 
 impl<T: Stage> ErasedStage for T {
@@ -39,11 +39,11 @@ impl<T: Stage> ErasedStage for T {
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("settings are plain data")
     }
-    fn look(&self, inputs: Option<Vec<Vec<(String, Input)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
+    fn look(&self, inputs: Option<Vec<Vec<(String, InputTable)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
         let reads = inputs.map(T::Reads::take).transpose()?;
         Stage::look(self, reads, context)?.map(Writes::give).transpose()
     }
-    fn run(&self, inputs: Vec<Vec<(String, Input)>>, context: &Context) -> Result<Vec<Output>> {
+    fn run(&self, inputs: Vec<Vec<(String, InputTable)>>, context: &Context) -> Result<Vec<Output>> {
         Stage::run(self, T::Reads::take(inputs)?, context)?.give()
     }
 }

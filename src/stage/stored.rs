@@ -29,10 +29,10 @@ impl StoredTable for Frame {
 }
 
 /// The table of a port.
-pub type Input = Box<dyn StoredTable>;
+pub type InputTable = Box<dyn StoredTable>;
 
 /// A field of a `reads!` struct whose table is read chunk by chunk.
-pub struct Chunks<T>(Input, PhantomData<fn() -> T>);
+pub struct Chunks<T>(InputTable, PhantomData<fn() -> T>);
 
 impl<T: Table> Chunks<T> {
     /// How many rows.
@@ -50,7 +50,7 @@ impl<T: Table> PortValue for Chunks<T> {
     const ARITY: Arity = Arity::One;
     const KIND: &'static str = T::KIND;
     const CHUNKED: bool = true;
-    fn take(inputs: Vec<(String, Input)>) -> Result<Self> {
+    fn take(inputs: Vec<(String, InputTable)>) -> Result<Self> {
         Ok(Self(inputs.into_iter().next().expect("the plan wired this port").1, PhantomData))
     }
 }

@@ -2,7 +2,7 @@
 
 use calib::error::{Error, Result};
 use calib::stage::{
-    Context, ErasedStage, Input, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
+    Context, ErasedStage, InputTable, OpenedInput, Output, Port, RawFile, Services, Sink, Stage, StageEntry, Streamed, Writes,
 };
 use calib::store::frame::Frame;
 use calib::table::Table;
@@ -41,7 +41,7 @@ impl Desk {
         stage: &dyn ErasedStage,
         frames: Vec<Vec<(String, Frame)>>,
     ) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
-        let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as Input);
+        let input = |(stage, frame): (String, Frame)| (stage, Box::new(frame) as InputTable);
         let inputs = frames.into_iter().map(|port| port.into_iter().map(input).collect()).collect();
         self.written(&(entry.writes)(), |context| stage.run(inputs, context))
     }

@@ -57,9 +57,6 @@ criteria! {
     /// A law of the list is never quite the true one: what a free form at its own place adds is its finer shape below this
     /// share of both.
     FINER: f64 = 0.1, "share", "judgement: arms and twin differ from the library by less", "";
-    /// A free form instead of a name at its own place is the finer shape of that name where the name alone explains all but
-    /// this share of what the form does: with enough rows no law of the list is exact.
-    NEARLY: f64 = 0.01, "share of the squared residual's fall", "judgement: a tenth of the effect", "changes nothing on 1";
     /// ln of the evidence by which a free form must be better than a name with a free form beside it, to stand in its place.
     CLEARLY: f64 = 3.0, "ln of evidence", "literature: strong, Jeffreys (1961)", "";
     /// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of

@@ -18,7 +18,7 @@ const RATE_OVER_CUTOFF: f64 = 10.0;
 /// The low-pass before thinning, as a share of the rate of kept rows.
 const BAND: f64 = 0.4;
 /// Of the low-pass: rows that it remembers, as a share of rate over cut-off.
-const MEMORY: f64 = 20.0;
+const MEMORY: f64 = 40.0;
 /// Rows of a span: a recording that is still too long keeps some spans and leaves out others, evenly.
 const SPAN: usize = 1 << 15;
 /// Rows before and after a gap that say what was lost in it.

@@ -207,7 +207,7 @@ pub(super) fn scan(
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
     let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    let (mut pace, mut contents) = (ProgressCounter::new(context), ContentHasher::default());
+    let (mut pace, mut contents) = (ProgressCounter::new(context), RowHasher::default());
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
         if let Some((joint, angle)) = row.turned {
@@ -297,11 +297,11 @@ fn key(row: &RecordedRow, content: u64, file: usize, label: &str) -> Result<IdFi
 
 /// Makes hashes of what rows say; its room is used again.
 #[derive(Default)]
-struct ContentHasher {
+struct RowHasher {
     bytes: Vec<u8>,
 }
 
-impl ContentHasher {
+impl RowHasher {
     /// Hash of the numbers, points and texts of a row.
     fn of(&mut self, row: &RecordedRow) -> u64 {
         self.bytes.clear();

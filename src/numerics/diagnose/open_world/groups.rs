@@ -41,10 +41,9 @@ impl FreeGroup {
         self.motion.place()
     }
 
-    /// Whether it depends on what drifts with the recording: rows after it are beyond all that was seen.
-    pub fn follows_time(&self) -> bool {
-        let drifts = |of: Variable| matches!(of, Variable::Time | Variable::Temperature | Variable::Lagging { .. });
-        self.law.factors().any(|factor| drifts(factor.of))
+    /// Whether time is one of its variables: later rows are beyond all that was seen.
+    pub fn drifts(&self) -> bool {
+        self.law.factors().any(|factor| factor.of == Variable::Time)
     }
 
     /// As what may join the model: a law without a name.

@@ -150,11 +150,6 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             key: *key,
             members: members.clone(),
             own: members.iter().flat_map(|i| own(*i, members.len())).collect(),
-            lawful: members
-                .iter()
-                .filter(|i| !causes[**i].form.cause().is_nameless())
-                .flat_map(|i| own(*i, members.len()))
-                .collect(),
         };
         let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();
         let rest = |own: &NamedFinding| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));

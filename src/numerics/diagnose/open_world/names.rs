@@ -4,7 +4,7 @@ use super::evidence::{evidence, log_sum};
 use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
-use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NEARLY, NOTHING, PLACES, RIVALS};
+use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NOTHING, PLACES, RIVALS};
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -97,8 +97,6 @@ pub(super) struct NamedFinding {
     pub members: Vec<usize>,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
     pub own: Vec<(usize, f64)>,
-    /// Those of them that are of laws of the list.
-    pub lawful: Vec<(usize, f64)>,
 }
 
 /// What the judgement of a finding rests on.
@@ -136,13 +134,7 @@ impl NameCase<'_, '_, '_, '_> {
         }
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
-        let free = instead.logs.iter().map(|(place, log)| (*place, open + log));
-        let (finer, mut free): (Vec<_>, Vec<_>) = if is_named && self.is_nearly_all(named, rest, &own, instead) {
-            free.partition(|(at, _)| *at == place)
-        } else {
-            (Vec::new(), free.collect())
-        };
-        names.extend(finer);
+        let mut free: Vec<(Place, f64)> = instead.logs.iter().map(|(place, log)| (*place, open + log)).collect();
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
         } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= *FINER) {
@@ -165,14 +157,6 @@ impl NameCase<'_, '_, '_, '_> {
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
         ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
-    }
-
-    /// Whether the named laws of a finding explain nearly all of what the free form at its place does instead of it.
-    fn is_nearly_all(&self, named: &NamedFinding, rest: &KnownCauses, own: &Own, instead: &SurveyedPlaces) -> bool {
-        let Some(form) = instead.best.iter().find(|form| form.place == named.key.1) else { return false };
-        let gain =
-            if named.lawful.len() < named.own.len() { self.evidence_of_causes(rest, &named.lawful).gain } else { own.gain };
-        gain > (1.0 - *NEARLY) * own.gain.max(form.gain)
     }
 
     /// Evidence and fall of the squared residual of some columns of the model's causes beside a state.

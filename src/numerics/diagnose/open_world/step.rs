@@ -40,8 +40,7 @@ impl ModelChange<'_, '_> {
     /// With a free form, or nothing. What follows time joins only where stretches of the recording that it did not see are predicted better
     /// with it: the others go on without it.
     pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
-        let (passing, lasting): (Vec<FreeTerm>, Vec<FreeTerm>) =
-            terms.iter().cloned().partition(|term| term.group.follows_time());
+        let (passing, lasting): (Vec<FreeTerm>, Vec<FreeTerm>) = terms.iter().cloned().partition(|term| term.group.drifts());
         let all = self.of_terms(terms, sentence.clone());
         if passing.is_empty() || all.as_ref().is_some_and(|step| self.predicts_stretches(step)) {
             return all;
