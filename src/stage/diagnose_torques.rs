@@ -47,7 +47,7 @@ pub enum HoldOut {
     Last(f64),
     /// These stretches of the recording, from 1.
     Trajectories(Vec<i64>),
-    /// Every so manieth second of the recording, from 2: of 3 the third, the sixth and so on.
+    /// Every k-th second of the recording, k from 2: with 3 the third, the sixth and so on.
     EverySecond(u32),
 }
 

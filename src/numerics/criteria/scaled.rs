@@ -38,7 +38,7 @@ impl<T> CriterionScaling<T> {
 }
 
 impl<T: Scaled> CriterionScaling<T> {
-    /// What stands for a value now.
+    /// The value as it is scaled now.
     pub(super) fn of<'v>(&'v self, value: &'v T) -> &'v T {
         self.reached.store(true, Ordering::Relaxed);
         match self.factor.load(Ordering::Relaxed) {

@@ -1,4 +1,4 @@
-//! A long recording in memory that does not grow with it: block by block through a low-pass, of which every so manieth row is kept.
+//! A long recording in memory that does not grow with it: block by block through a low-pass, of which every k-th row is kept.
 //!
 //! A course that is filtered before its rows are thinned keeps what is slow. Blocks overlap by what the filter remembers, so that it does not
 //! matter where they end.
@@ -18,7 +18,7 @@ const RATE_OVER_CUTOFF: f64 = 10.0;
 /// The low-pass before thinning, as a share of the rate of kept rows.
 const BAND: f64 = 0.4;
 /// Of the low-pass: rows that it remembers, as a share of rate over cut-off.
-const MEMORY: f64 = 40.0;
+const MEMORY: f64 = 20.0;
 /// Rows of a span: a recording that is still too long keeps some spans and leaves out others, evenly.
 const SPAN: usize = 1 << 15;
 /// Rows before and after a gap that say what was lost in it.
@@ -184,7 +184,7 @@ impl Thinner {
         self.passed = end - from;
     }
 
-    /// Keeps every so manieth row of the stretch, as far as the filter knows it.
+    /// Keeps every k-th row of the stretch, as far as the filter knows it.
     fn keep(&mut self, ends: bool) {
         let rows = self.stretch.rows();
         let known = if ends { rows } else { rows.saturating_sub(self.margin) };

@@ -1,10 +1,10 @@
-//! A current that stands for another torque than declared.
+//! A current that makes another torque than declared.
 
 use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, fill, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
-/// A current that stands for another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
+/// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) struct TorqueConstant;
 
