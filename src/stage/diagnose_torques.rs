@@ -163,7 +163,7 @@ impl Stage for DiagnoseTorques {
         diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
-            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.from_current()),
+            verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
             findings: TorqueFindings::of(&diagnosis),
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),

@@ -43,7 +43,7 @@ impl<'a> RecordedTorques<'a> {
     }
 
     /// Whether torques are motor currents times a constant.
-    pub fn from_current(&self) -> bool {
+    pub fn is_current(&self) -> bool {
         self.factor.is_some()
     }
 
@@ -69,7 +69,7 @@ impl<'a> RecordedTorques<'a> {
             temperature: motion.temperature,
             trajectory: motion.trajectory.iter().map(|number| u32::try_from(*number).unwrap_or(u32::MAX)).collect(),
             held_out,
-            from_current: self.from_current(),
+            from_current: self.is_current(),
         }
     }
 }

@@ -147,7 +147,7 @@ joints: [{name: A1}, {name: A2}]
             (term.error.to_vec(), term.axes, partials)
         };
         let (_, _, partials) = seen(&model);
-        for k in 0..model.x.len() {
+        for (k, partial) in partials.iter().enumerate() {
             let mut at = |x: f64| {
                 model.x[k] = x;
                 seen(&model).0
@@ -157,7 +157,7 @@ joints: [{name: A1}, {name: A2}]
             for line in 0..5 {
                 // Measured less predicted falls as the prediction grows.
                 let difference = (below[line] - above[line]) / 2e-6;
-                assert!((difference - partials[k][line]).abs() < 1e-4 * (1.0 + difference.abs()), "{k} {line}: {difference}");
+                assert!((difference - partial[line]).abs() < 1e-4 * (1.0 + difference.abs()), "{k} {line}: {difference}");
             }
         }
         assert!(partials.iter().flatten().any(|value| value.abs() > 1e3));
