@@ -1,5 +1,6 @@
 //! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
+use super::friction::{ARMATURE, DAMPING, FRICTION, exponent};
 use super::{CarriedTorques, Export, Format};
 use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS};
 use crate::error::{Error, Result};
@@ -39,11 +40,17 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
     let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
-        let of = |effect: &'static str| rows(effect).find(|row| row.place == place && row.form.is_some()).map_or(Value::Null, number);
+        let of =
+            |effect: &'static str| rows(effect).find(|row| row.place == place && row.form.is_some()).map_or(Value::Null, number);
         let seen = &model.range[index];
+        let mut viscous = of(DAMPING);
+        if let (Some(own), Some(exponent)) = (viscous.as_object_mut(), exponent(torques, index)) {
+            own.insert("unit".into(), json!("Nm (s/rad)^exponent"));
+            own.insert("exponent".into(), json!(exponent));
+        }
         json!({
-            "name": joint.name, "viscous": of("viscous_friction"), "coulomb": of("coulomb_friction"),
-            "armature": of("rotor_inertia"), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
+            "name": joint.name, "viscous": viscous, "coulomb": of(FRICTION),
+            "armature": of(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
             "sign_width_rad_s": seen.sign_width,
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
         })

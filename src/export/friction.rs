@@ -1,27 +1,46 @@
 //! What formats hold of the identified torques: friction, rotor and drive of each joint. What they do not hold is listed.
 
 use super::{CarriedTorques, Export};
-use crate::dynamics::TorqueTerm;
+use crate::dynamics::{COULOMB, JointRange, TorqueTerm};
 use crate::effect::Place;
 use crate::identified::IdentifiedTorques;
 
 /// Causes that a format has an attribute for.
 pub(super) const DAMPING: &str = "viscous_friction";
-pub(super) const FRICTION: &str = "coulomb_friction";
+pub(super) const FRICTION: &str = COULOMB;
 pub(super) const ARMATURE: &str = "rotor_inertia";
 pub(super) const DRIVE: &str = "torque_constant";
 
-/// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found. Formats know one number: of friction that
-/// grows with another power of speed, and of a torque constant that falls with torque, it is the one that is right at half of the greatest
-/// speed or load of the recording.
+/// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found. Of a law with a shape it is the number that
+/// formats can hold, see [`as_one_number`].
 pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
     let own = torques.model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(joint))?;
     let (value, seen) = (own.coefficients.first().copied()?, torques.model.range.get(joint)?);
-    Some(match (effect, own.shape.first()) {
-        (DAMPING, Some(exponent)) if seen.speed > 0.0 => value * (0.5 * seen.speed).powf(exponent - 1.0),
-        (DRIVE, Some(half)) if seen.load.is_finite() => value / (1.0 + 0.5 * seen.load / half),
-        _ => value,
-    })
+    Some(as_one_number(own, value, seen).map_or(value, |(held, _)| held))
+}
+
+/// The power of speed with which viscous friction of a joint (from 0) grows, where that is not 1.
+pub(super) fn exponent(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
+    let own = torques.model.terms.iter().find(|term| term.effect == DAMPING && term.place == Place::Joint(joint))?;
+    own.shape.first().copied().filter(|exponent| *exponent != 1.0)
+}
+
+/// What formats of one number hold of a law that has a shape, and what must be said of it: friction that grows with another power of speed, and
+/// a torque constant that falls with torque, are right at half of the greatest speed or load of the recording.
+fn as_one_number(term: &TorqueTerm, value: f64, seen: &JointRange) -> Option<(f64, String)> {
+    let place = &term.place;
+    match (term.effect.as_str(), *term.shape.first()?) {
+        (DAMPING, exponent) if exponent != 1.0 && seen.speed > 0.0 => {
+            let (speed, held) = (0.5 * seen.speed, value * (0.5 * seen.speed).powf(exponent - 1.0));
+            let law = format!("grows with the power {exponent:.2} of speed");
+            Some((held, format!("{DAMPING} at {place} {law}: {held:.4} Nm s/rad is written, which is right at {speed:.3} rad/s")))
+        }
+        (DRIVE, half) if seen.load.is_finite() => {
+            let (load, held) = (0.5 * seen.load, value / (1.0 + 0.5 * seen.load / half));
+            Some((held, format!("{DRIVE} at {place} changes with torque: what is written is right at {load:.3} Nm")))
+        }
+        _ => None,
+    }
 }
 
 /// The same where formats allow no less than 0.
@@ -53,11 +72,52 @@ impl Export {
             let named = matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());
             named && (term.effect == DRIVE || term.coefficients[0] >= 0.0)
         };
+        let held = torques.model.terms.iter().filter(holds);
+        lines.extend(held.filter_map(|term| {
+            let Place::Joint(joint) = term.place else { return None };
+            Some(as_one_number(term, *term.coefficients.first()?, torques.model.range.get(joint)?)?.1)
+        }));
         let left = torques.model.terms.iter().filter(|term| !holds(term));
         lines.extend(
             left.map(|term| format!("not carried: {} at {}, {:.4} Nm rms over the recording", term.effect, term.place, term.rms)),
         );
         lines.extend(torques.of_the_recording.iter().map(|statement| format!("of the recording alone: {statement}")));
         lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SEEN: JointRange = JointRange {
+        position: [-1.0, 1.0],
+        speed: 2.0,
+        acceleration: 1.0,
+        load: 40.0,
+        misfit: 0.0,
+        usual: 0.0,
+        sign_width: 0.01,
+    };
+
+    fn held(effect: &str, shape: &[f64], value: f64) -> Option<(f64, String)> {
+        let (place, coefficients) = (Place::Joint(1), vec![value]);
+        let term = TorqueTerm { effect: effect.into(), place, with: [0; 2], shape: shape.to_vec(), coefficients, rms: 1.0 };
+        as_one_number(&term, value, &SEEN)
+    }
+
+    #[test]
+    fn a_law_with_a_shape_is_written_as_one_number_and_with_a_word() {
+        // 4 Nm at 1 rad/s, half of the greatest speed.
+        let (value, said) = held(DAMPING, &[0.8], 4.0).expect("a remark");
+        assert_eq!(value, 4.0);
+        assert_eq!(
+            said,
+            "viscous_friction at joint 2 grows with the power 0.80 of speed: 4.0000 Nm s/rad is written, which is right at 1.000 rad/s"
+        );
+        let (value, said) = held(DRIVE, &[20.0, 40.0], 0.2).expect("a remark");
+        assert!((value - 0.1).abs() < 1e-15 && said.ends_with("is right at 20.000 Nm"), "{value} {said}");
+        assert_eq!(held(DAMPING, &[1.0], 4.0), None);
+        assert_eq!(held(DRIVE, &[], 0.2), None);
     }
 }

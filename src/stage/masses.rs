@@ -34,7 +34,7 @@ writes! {
 impl Stage for Masses {
     const NAME: &'static str = "masses";
     const SUMMARY: &'static str = "gives the robot of later stages the masses, centres and dry friction that its torques show";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = MassesReads;
     type Writes = MassesWrites;
 
@@ -54,10 +54,11 @@ impl Stage for Masses {
                 robot.inertias.links[index] = Some([i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]]);
             }
         }
-        for (joint, friction) in robot.joints.iter_mut().zip(model.coulomb()) {
+        let friction = reads.parameters.dry_friction(links.len());
+        context.services.note(told_of_friction(&friction));
+        for (joint, friction) in robot.joints.iter_mut().zip(friction) {
             joint.coulomb = friction;
         }
-        context.services.note(told_of_friction(&model.coulomb()));
         if !(0..links.len()).all(|link| model.is_whole(link)) {
             context.services.note(
                 "base parameters alone were identified: masses stay as declared, centres are where gravity needs them; inertias stay as declared"

@@ -1,6 +1,6 @@
 //! The identified model of torques: one table from which it is made again, and its covariance.
 
-use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm};
+use crate::dynamics::{COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,8 @@ struct TermForm {
     shape: Vec<f64>,
 }
 
+/// Standard deviations from which on dry friction is sure.
+const SURE: f64 = 3.0;
 const LINKS: &str = "rigid_body";
 const SEEN: &str = "recording";
 /// Of a joint's range, in the order of [`ends`].
@@ -119,6 +121,18 @@ impl TorqueParameters {
         }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(rows))
+    }
+
+    /// Dry friction of each joint (n, Nm); `None` where none was found, or less than is sure: what an arm has in the model without a name may
+    /// as well be nothing, and says nothing of where a joint rests.
+    pub fn dry_friction(&self, joints: usize) -> Vec<Option<f64>> {
+        let at = |joint: usize| {
+            let place = Place::Joint(joint).to_string();
+            let here = |row: &&TorqueParameterRow| row.effect == COULOMB && row.place == place && row.form.is_some();
+            let own = self.0.iter().find(here)?;
+            (own.value > SURE * own.sigma.unwrap_or(0.0)).then_some(own.value)
+        };
+        (0..joints).map(at).collect()
     }
 
     /// The model, without its covariance. Fails where rows that every model has are missing or not understood.
@@ -274,5 +288,27 @@ impl TorqueCovariance {
                 Err(Error::data("table torque_covariance", format!("has no covariance of {one} and {other}")))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_that_may_as_well_be_nothing_is_none() {
+        let row = |joint: usize, value: f64, sigma: Option<f64>| TorqueParameterRow {
+            name: format!("coulomb_friction.j{joint}.coulomb"),
+            effect: COULOMB.into(),
+            place: format!("joint {joint}"),
+            quantity: "coulomb".into(),
+            value,
+            unit: "Nm".into(),
+            sigma,
+            rms_nm: Some(1.0),
+            form: Some("{}".into()),
+        };
+        let all = TorqueParameters(vec![row(1, 6.0, Some(0.1)), row(2, 0.2, Some(0.1)), row(4, 2.0, None)]);
+        assert_eq!(all.dry_friction(4), [Some(6.0), None, None, Some(2.0)]);
     }
 }

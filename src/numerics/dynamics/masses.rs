@@ -5,12 +5,10 @@
 //! is declared for it, and its centre is where the torques need it.
 
 use super::arm::{DynamicArm, Inertial};
-use super::cause::COULOMB;
 use super::consistency::nearest;
 use super::inertials::numbers;
-use super::model::{TorqueModel, TorqueTerm};
+use super::model::TorqueModel;
 use super::newton_euler::INERTIAL_NUMBERS;
-use crate::effect::Place;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A link as torques show it.
@@ -25,15 +23,6 @@ pub struct LinkFromTorques {
 }
 
 impl TorqueModel {
-    /// Friction of each joint (n, Nm) that turns with the direction of motion; `None` where none was found.
-    pub fn coulomb(&self) -> Vec<Option<f64>> {
-        let at = |joint: usize| {
-            let here = |term: &&TorqueTerm| term.effect == COULOMB && term.place == Place::Joint(joint);
-            self.terms.iter().find(here)?.coefficients.first().copied().filter(|friction| *friction > 0.0)
-        };
-        (0..self.joints()).map(at).collect()
-    }
-
     /// The links (n) of the arm that the model was identified on, without the payload that it declares. `masses` (n, kg, above 0): what is
     /// declared of each link, or what it shall have where nothing is.
     pub fn links(&self, arm: &DynamicArm, masses: &[f64]) -> Vec<LinkFromTorques> {

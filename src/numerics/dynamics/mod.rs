@@ -68,6 +68,7 @@ mod used;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
+pub use cause::COULOMB;
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};

@@ -113,12 +113,12 @@ struct Thinner {
 
 impl Thinner {
     fn new(like: &TorqueRecording, pace: ClockPace, plan: ThinningPlan) -> Self {
-        let rate = 1.0 / pace.usual;
-        let band = BAND * rate / plan.every as f64;
-        let filter = if plan.every > 1 { ZeroPhase::new(rate, band) } else { ZeroPhase::new(rate, rate) };
+        // Of the rate of kept rows, whatever the clock: what the filter does depends on nothing that blocks measure.
+        let rate = plan.every as f64;
+        let filter = ZeroPhase::new(rate, if plan.every > 1 { BAND } else { rate });
         let nothing = || TorqueRecording::like(like);
         Self {
-            margin: if plan.every > 1 { (MEMORY * rate / band) as usize } else { 0 },
+            margin: if plan.every > 1 { (MEMORY * rate / BAND) as usize } else { 0 },
             filter,
             plan,
             pace,

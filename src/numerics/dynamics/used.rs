@@ -149,8 +149,7 @@ mod tests {
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let far = apart(&one.recording.position, &other.recording.position);
         let torque = apart(&one.recording.torque, &other.recording.torque);
-        // To some millionths of what is recorded.
-        assert!(far < 1e-7 && torque < 1e-4, "{far} {torque}");
+        assert!(far < 1e-9 && torque < 1e-6, "{far} {torque}");
     }
 
     #[test]

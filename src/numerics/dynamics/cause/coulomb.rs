@@ -5,7 +5,7 @@ use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
-pub(in crate::dynamics) const COULOMB: &str = "coulomb_friction";
+pub const COULOMB: &str = "coulomb_friction";
 
 /// Friction of one size against the direction of motion.
 pub(super) struct Coulomb;

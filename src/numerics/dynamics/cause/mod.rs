@@ -33,7 +33,7 @@ use super::newton_euler::INERTIAL_NUMBERS;
 use super::scene::DynamicScene;
 use super::types::TorqueParameter;
 use crate::effect::Place;
-pub(super) use coulomb::COULOMB;
+pub use coulomb::COULOMB;
 pub(super) use offset::OFFSET;
 pub(super) use rotor::ROTOR;
 pub(super) use unknown::UNKNOWN;
