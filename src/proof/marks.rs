@@ -5,23 +5,40 @@ use crate::error::{Error, Result};
 use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
+use crate::twin::reveal::left_out::left_out;
 use crate::twin::reveal::mark::{Case, mark};
 use crate::twin::reveal::paper::{Answer, Truth};
+use crate::twin::reveal::place::NAMELESS;
 use parquet::arrow::ArrowWriter;
 use std::path::Path;
 
-/// All sealed cases of the set, marked; `files` are the paths that the seal holds.
+/// Folder, within that of the verdicts, of diagnoses without the causes of their recordings.
+pub const LEFT_OUT: &str = "left_out";
+
+/// All sealed cases of the set, marked; `files` are the paths that the seal holds. Of those that were diagnosed without their causes, too,
+/// what was said in their stead.
 pub fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<Board> {
     let mut board = Board::default();
     for name in files.iter().filter(|name| Path::new(name).starts_with(SEALED)) {
         let path = folder.join(name);
         let truth: Truth = read(&path).map_err(|why| Error::data(path.display().to_string(), why))?;
         match read::<Answer>(&verdicts.join(path.file_name().unwrap_or_default())) {
-            Ok(answer) => board.cases.push(mark(&truth, &answer)),
+            Ok(answer) => {
+                let without = read::<Answer>(&verdicts.join(LEFT_OUT).join(path.file_name().unwrap_or_default())).ok();
+                board.left_out.extend(without.and_then(|without| left_out(&truth, &answer, &without)));
+                board.cases.push(mark(&truth, &answer));
+            }
             Err(why) => board.missing.push((truth.case, why)),
         }
     }
     Ok(board)
+}
+
+/// The cause to leave out of a recording whose truth lies at `path`; none where no single cause of the list is concealed.
+pub fn single_cause(path: &Path) -> Result<Option<String>> {
+    let truth: Truth = read(path).map_err(|why| Error::data(path.display().to_string(), why))?;
+    let listed = truth.content == "single" && truth.effects.iter().all(|cause| cause.effect != NAMELESS);
+    Ok(truth.effects.into_iter().find(|cause| cause.wanted && listed).map(|cause| cause.effect))
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {

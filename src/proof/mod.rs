@@ -7,7 +7,7 @@ mod seal;
 mod set;
 
 pub use concealed_set::ConcealedSet;
-pub use marks::{board, write_scoreboard};
+pub use marks::{LEFT_OUT, board, single_cause, write_scoreboard};
 pub use recorded::recorded;
 pub use seal::{RECORDINGS, SEAL, SEALED, Seal};
 pub use set::{conceal, vacant};

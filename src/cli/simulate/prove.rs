@@ -4,7 +4,7 @@ use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
-use crate::proof::{self, ConcealedSet, RECORDINGS, SEAL, SEALED, Seal};
+use crate::proof::{self, ConcealedSet, LEFT_OUT, RECORDINGS, SEAL, SEALED, Seal};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,11 +14,14 @@ use std::process::{Command, Stdio};
 ///
 /// Makes the recordings as `conceal` does, runs `calib diagnose PIPELINE --set case=DIR/recordings/CASE --json` for each in a
 /// process of its own, keeps what it says in DIR/verdicts, and prints what `reveal` prints. Given again after an interruption
-/// it goes on with what is not yet diagnosed.
+/// it goes on with what is not yet diagnosed. With --left-out every recording of one listed cause is diagnosed a second time with that
+/// cause taken out of the list, and marked as physics that nobody listed.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate prove --out proof --seed 7 --cases 60 --nulls 0.2 --pairs 0.2 --open 0.1
   calib simulate prove --out gears --cases 30 --family gear_cyclic,gear_motor_cyclic --json > score.json
+  calib simulate prove --out open --seed 7 --cases 60 --natural 0 --left-out
+  calib simulate prove --out foreign --seed 7 --cases 60 --foreign 1 --faulty 0
   calib simulate prove --out further --seed 7 --cases 300 --families beyond
   calib simulate prove --out moving --seed 7 --cases 60 --dynamics --nulls 0.2 --pairs 0.2 --open 0.1")]
 pub(super) struct ProveArguments {
@@ -28,6 +31,9 @@ pub(super) struct ProveArguments {
     /// pipelines/dynamics/pipeline.yaml]
     #[arg(long, value_name = "PIPELINE")]
     pipeline: Option<PathBuf>,
+    /// Diagnoses every recording of one listed cause without that cause, too: `diagnose.without` of the pipeline is set
+    #[arg(long, conflicts_with = "dynamics")]
+    left_out: bool,
     /// Prints no progress
     #[arg(long, short)]
     quiet: bool,
@@ -64,19 +70,29 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
     let names: Vec<String> = Seal::check(folder)?.iter().filter_map(|name| case(name)).collect();
     let store = |error: std::io::Error| Error::store(folder.join(VERDICTS).display().to_string(), error.to_string());
-    std::fs::create_dir_all(folder.join(VERDICTS)).map_err(store)?;
+    let verdicts = folder.join(VERDICTS);
+    std::fs::create_dir_all(&verdicts).map_err(store)?;
     let program = std::env::current_exe().map_err(store)?;
+    let blind = BlindDiagnosis { program: &program, pipeline: &pipeline, folder };
     let told = in_order(arguments.conceal.threads(), names.len(), |number| -> Result<()> {
         let name = &names[number];
-        let said = diagnose(&program, &pipeline, folder, name)?;
-        if !arguments.quiet {
-            let _ = writeln!(std::io::stderr(), "{name}: {said}");
+        let tell = |said: &str| {
+            if !arguments.quiet {
+                let _ = writeln!(std::io::stderr(), "{name}: {said}");
+            }
+        };
+        tell(&blind.diagnose(name, &verdicts, None)?);
+        let left_out = arguments.left_out.then(|| proof::single_cause(&folder.join(SEALED).join(format!("{name}.json"))));
+        if let Some(cause) = left_out.transpose()?.flatten() {
+            let verdicts = verdicts.join(LEFT_OUT);
+            std::fs::create_dir_all(&verdicts).map_err(store)?;
+            tell(&format!("without its cause: {}", blind.diagnose(name, &verdicts, Some(&cause))?));
         }
         Ok(())
     });
     told.into_iter().collect::<Result<()>>()?;
     let sealed = Seal::check(folder)?;
-    let board = proof::board(folder, &sealed, &folder.join(VERDICTS))?;
+    let board = proof::board(folder, &sealed, &verdicts)?;
     if arguments.conceal.json {
         return emit_json(&board.document());
     }
@@ -90,29 +106,42 @@ fn case(name: &str) -> Option<String> {
     Some(stem.to_string_lossy().into_owned())
 }
 
-/// Has one recording diagnosed and keeps the verdict; gives a line about it. Fails where the process cannot be started.
-fn diagnose(program: &Path, pipeline: &Path, folder: &Path, name: &str) -> Result<String> {
-    let verdict = folder.join(VERDICTS).join(format!("{name}.json"));
-    if verdict.is_file() {
-        return Ok("diagnosed before".into());
+/// Diagnoses by processes of their own, which see a recording and nothing else of its set.
+struct BlindDiagnosis<'a> {
+    program: &'a Path,
+    pipeline: &'a Path,
+    folder: &'a Path,
+}
+
+impl BlindDiagnosis<'_> {
+    /// Has one recording diagnosed, without one cause if it is named, and keeps the verdict; gives a line about it. Fails where the process
+    /// cannot be started.
+    fn diagnose(&self, name: &str, verdicts: &Path, without: Option<&str>) -> Result<String> {
+        let verdict = verdicts.join(format!("{name}.json"));
+        if verdict.is_file() {
+            return Ok("diagnosed before".into());
+        }
+        let fault = |error: std::io::Error| Error::store(verdict.display().to_string(), error.to_string());
+        // A variable of a pipeline is relative to its file.
+        let recording = std::path::absolute(self.folder.join(RECORDINGS).join(name)).map_err(fault)?;
+        let tables = verdicts.join(name).with_extension("store");
+        let mut command = Command::new(self.program);
+        command.arg("diagnose").arg(self.pipeline).arg("--set").arg(format!("case={}", recording.display()));
+        if let Some(cause) = without {
+            command.arg("--set").arg(format!("diagnose.without=[{cause}]"));
+        }
+        command.args(["--json", "--quiet", "--jobs", "1", "--store"]).arg(&tables).stdin(Stdio::null());
+        let done = command.output().map_err(fault)?;
+        let _ = std::fs::remove_dir_all(&tables);
+        if !done.status.success() {
+            let why = String::from_utf8_lossy(&done.stderr);
+            return Ok(format!("no verdict: {}", why.lines().next().unwrap_or("the process failed")));
+        }
+        // Renamed when whole: an interruption leaves no half verdict.
+        let part = verdict.with_extension("part");
+        std::fs::write(&part, &done.stdout).and_then(|()| std::fs::rename(&part, &verdict)).map_err(fault)?;
+        let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
+        let said = answer.as_ref().and_then(|answer| answer.get("verdict")?.as_str()).unwrap_or("a verdict that is no JSON");
+        Ok(said.chars().filter(|c| !c.is_control()).collect())
     }
-    let fault = |error: std::io::Error| Error::store(verdict.display().to_string(), error.to_string());
-    // A variable of a pipeline is relative to its file.
-    let recording = std::path::absolute(folder.join(RECORDINGS).join(name)).map_err(fault)?;
-    let tables = folder.join(VERDICTS).join(name).with_extension("store");
-    let mut command = Command::new(program);
-    command.arg("diagnose").arg(pipeline).arg("--set").arg(format!("case={}", recording.display()));
-    command.args(["--json", "--quiet", "--jobs", "1", "--store"]).arg(&tables).stdin(Stdio::null());
-    let done = command.output().map_err(fault)?;
-    let _ = std::fs::remove_dir_all(&tables);
-    if !done.status.success() {
-        let why = String::from_utf8_lossy(&done.stderr);
-        return Ok(format!("no verdict: {}", why.lines().next().unwrap_or("the process failed")));
-    }
-    // Renamed when whole: an interruption leaves no half verdict.
-    let part = verdict.with_extension("part");
-    std::fs::write(&part, &done.stdout).and_then(|()| std::fs::rename(&part, &verdict)).map_err(fault)?;
-    let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
-    let said = answer.as_ref().and_then(|answer| answer.get("verdict")?.as_str()).unwrap_or("a verdict that is no JSON");
-    Ok(said.chars().filter(|c| !c.is_control()).collect())
 }

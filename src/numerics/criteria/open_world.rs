@@ -62,6 +62,8 @@ criteria! {
     /// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of
     /// names that were wrong where it was sure of them.
     MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "changes nothing on 2";
+    /// That a cause which is taken out of the list is called by another name with 0.9 or more.
+    MIMICRY: f64 = 0.14, "probability", "count: 14 of 100 concealed causes of L 50 or more", "";
     /// Places at which a free form is asked with more than one group.
     PLACES: usize = 2, "places", "judgement: bounds time", "";
     /// Functions of each variable that are looked at.

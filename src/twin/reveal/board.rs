@@ -1,5 +1,6 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
+use super::left_out::LeftOut;
 use super::mark::{Case, Marked, Outcome};
 use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
@@ -56,6 +57,8 @@ pub struct Board {
     pub cases: Vec<Case>,
     /// Cases without a verdict, or with one that cannot be read, and why.
     pub missing: Vec<(String, String)>,
+    /// Recordings that were diagnosed without their causes, too.
+    pub left_out: Vec<LeftOut>,
 }
 
 /// Forms of the twin whose formula the library does not have: it approximates them. Every other form, of what is in no list too, is one that
@@ -187,6 +190,12 @@ impl Board {
         [sorted(self.cases.iter().filter(due).collect()), sorted(self.cases.iter().filter(null).collect())]
     }
 
+    /// Recordings with a due effect whose held-out error is larger with the findings than before.
+    pub fn worse(&self) -> Share {
+        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
+        Share::of(due.filter_map(|case| case.held_out.map(|held_out| held_out.after > held_out.before)))
+    }
+
     /// Explained shares of held-out errors where an effect is due, ascending.
     pub fn explained(&self) -> Vec<f64> {
         let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
@@ -208,6 +217,12 @@ impl Board {
     /// Stated probabilities against what was true.
     pub fn reliability(&self, subject: Subject) -> Reliability {
         reliability(self.cases.iter().flat_map(|case| &case.statements), subject)
+    }
+
+    /// Stated probabilities of recordings without their causes in which the data cannot tell that something is left out.
+    pub fn untold_reliability(&self) -> Reliability {
+        let untold = self.left_out.iter().filter(|one| one.strength >= DUE && !one.tells);
+        reliability(untold.flat_map(|one| &one.statements), Subject::Name)
     }
 
     /// Verdicts by content.

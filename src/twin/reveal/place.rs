@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 /// Faults of single points: they say nothing about where a cause sits.
 const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
 /// What has a place and no name.
-const NAMELESS: &str = "unknown";
+pub const NAMELESS: &str = "unknown";
 
 /// What was said of a cause.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

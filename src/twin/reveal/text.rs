@@ -1,6 +1,7 @@
 //! The scoreboard for people and for programs.
 
 use super::board::{BINS, Board, Company, Counts, DUE, NEAR_BOUND};
+use super::left_out::{GIVEN, LeftOutShares};
 use super::mark::Case;
 use super::place::Places;
 use super::reliability::{Bin, Reliability, Subject};
@@ -11,6 +12,9 @@ use std::fmt::Write;
 
 /// Whether the library has the formula by which the twin makes an effect.
 const FORMULAS: [(&str, bool); 2] = [("formulas that the library has", true), ("formulas that it has not", false)];
+
+/// Whether the held-out error tells that a cause is left out.
+const TOLD: [(&str, bool); 2] = [("where the data can tell", true), ("where it cannot", false)];
 
 impl Board {
     /// The scoreboard as text, mm and percent.
@@ -67,16 +71,9 @@ impl Board {
             let _ = writeln!(out, "explained share of the held-out error: median {median:.4}");
         }
         for subject in [Subject::Name, Subject::Place] {
-            let Reliability { bins, brier, auc } = self.reliability(subject);
-            if let Some(brier) = brier {
-                let auc = auc.map(|auc| format!(", area under the ROC curve {auc:.3}")).unwrap_or_default();
-                let _ = writeln!(out, "\nstated probabilities of {}: Brier score {brier:.4}{auc}", subject.name());
-                let _ = writeln!(out, "  from  to    stated  right");
-            }
-            for Bin { from, to, stated, right } in bins {
-                let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {}", percent(&right));
-            }
+            tell_reliability(&mut out, subject.name(), &self.reliability(subject));
         }
+        self.tell_left_out(&mut out);
         for ((content, verdict), count) in self.verdicts() {
             let _ = writeln!(out, "{content}: {verdict} {count}");
         }
@@ -127,6 +124,26 @@ impl Board {
         let near = self.near_bound();
         if near.of > 0 {
             let _ = writeln!(out, "held-out rms within {NEAR_BOUND} of its bound: {}", percent(&near));
+            let _ = writeln!(out, "held-out rms larger than before: {}", percent(&self.worse()));
+        }
+    }
+
+    /// Recordings without their causes.
+    fn tell_left_out(&self, out: &mut String) {
+        for (title, tells) in TOLD.into_iter().filter(|_| !self.left_out.is_empty()) {
+            let shares = LeftOutShares::of(&self.left_out, tells);
+            let _ = writeln!(out, "\ncauses of L {DUE} or more left out of the list, {title}: {} recordings", shares.wrong.of);
+            for (what, share) in shares.titled() {
+                let _ = writeln!(out, "  {what}: {}", percent(&share));
+            }
+            for one in self.left_out.iter().filter(|one| one.tells == tells && one.strength >= DUE) {
+                if let Some((name, probability)) = one.wrong.as_ref().filter(|(_, probability)| *probability >= GIVEN) {
+                    let _ = writeln!(out, "    {}: {} is called {name} with {probability:.2}", one.name, one.effect);
+                }
+            }
+        }
+        if !self.left_out.is_empty() {
+            tell_reliability(out, "names where the data cannot tell", &self.untold_reliability());
         }
     }
 
@@ -157,10 +174,14 @@ impl Board {
             let (of, mean) = self.by_formula(shared);
             json!({ "shared": shared, "outcomes": counts(&of), "mean_probability": mean })
         });
-        let reliability = [Subject::Name, Subject::Place].map(|subject| {
-            let Reliability { bins, brier, auc } = self.reliability(subject);
+        let reliable = |of: &str, Reliability { bins, brier, auc }: Reliability| {
             let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
-            json!({ "of": subject.name(), "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
+            json!({ "of": of, "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
+        };
+        let reliability = [Subject::Name, Subject::Place].map(|subject| reliable(subject.name(), self.reliability(subject)));
+        let left_out = TOLD.map(|(title, tells)| {
+            let shares = LeftOutShares::of(&self.left_out, tells).titled();
+            json!({ "which": title, "shares": shares.iter().map(|(what, of)| json!({ "what": what, "share": share(of) })).collect::<Vec<_>>() })
         });
         let places = |of: &Places| {
             let each = [("place", of.place), ("name_or_unknown", of.name_or_unknown), ("wrong_name", of.wrong_name)];
@@ -183,10 +204,23 @@ impl Board {
             "reliability": reliability,
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
             "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
-            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()) },
+            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()), "due_worse": share(&self.worse()) },
+            "left_out": { "recordings": self.left_out.len(), "worlds": left_out, "reliability": reliable("names where the data cannot tell", self.untold_reliability()) },
             "explained_share": spread(&self.explained()),
             "failures": self.failures().map(failure).collect::<Vec<_>>(),
         })
+    }
+}
+
+/// Stated probabilities against what was true.
+fn tell_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }: &Reliability) {
+    if let Some(brier) = brier {
+        let auc = auc.map(|auc| format!(", area under the ROC curve {auc:.3}")).unwrap_or_default();
+        let _ = writeln!(out, "\nstated probabilities of {of}: Brier score {brier:.4}{auc}");
+        let _ = writeln!(out, "  from  to    stated  right");
+    }
+    for Bin { from, to, stated, right } in bins {
+        let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {}", percent(right));
     }
 }
 

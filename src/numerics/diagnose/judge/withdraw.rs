@@ -6,7 +6,6 @@ use super::comparison::ModelComparison;
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::finding_groups::{FindingGroups, groups};
 use crate::diagnose::round::FitState;
-use crate::estimate::ParameterStatus;
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool
 /// in their order, `gains` what folds say of them.
@@ -54,18 +53,8 @@ fn useless(now: &FitState, comparison: &ModelComparison) -> Option<FitState> {
 
 /// The finding that was not estimated, else the weakest of those that are smaller than their own uncertainty.
 fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<(Vec<usize>, String, FitState)> {
-    let strength = |members: &[usize]| -> Option<f64> {
-        let own = members.iter().flat_map(|i| now.ranges[*i].clone());
-        let free: Vec<usize> = own.filter(|k| matches!(now.fitted.statuses[*k], ParameterStatus::Free(_))).collect();
-        if free.is_empty() {
-            return Some(0.0);
-        }
-        let values: Vec<f64> = free.iter().map(|k| now.model.x[*k]).collect();
-        let square = now.fitted.covariance.as_ref()?.distance(&free, &values)?;
-        Some(square / free.len() as f64)
-    };
     let groups = groups(now, set, comparison.pool, comparison.survey);
-    let weak = groups.into_iter().filter_map(|(key, members)| Some((strength(&members)?, key, members)));
+    let weak = groups.into_iter().filter_map(|(key, members)| Some((now.square_size(&members)?, key, members)));
     let (size, (effect, place), members) = weak.filter(|(size, ..)| *size < 1.0).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let why = if size == 0.0 {
         "these data cannot separate it from the rest of the model"

@@ -183,13 +183,13 @@ impl PlaceGroups {
 
     /// The free form beside a state.
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
-        let (mut now, mut terms) = (state.clone(), Vec::new());
+        let (mut now, mut terms): (_, Vec<FreeTerm>) = (state.clone(), Vec::new());
         let mut log = f64::NEG_INFINITY;
         let mut columns = GroupColumns::new(around.frame);
         for step in 0..*GROUPS {
             let scan = self.scan(&now);
             let paid = |g: usize| scan[g].0.log - self.price(g);
-            let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
+            let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid() && is_new(&self.groups[*g].group, &terms));
             let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
             if step == 0 {
                 log = self.alternatives(&scan);
@@ -218,6 +218,12 @@ impl PlaceGroups {
     }
 }
 
+/// Whether no term of a free form has the same numbers by their names: a model holds each once.
+fn is_new(group: &FreeGroup, terms: &[FreeTerm]) -> bool {
+    let key = |group: &FreeGroup| group.hypothesis().form.key();
+    terms.iter().all(|term| term.group.motion != group.motion || key(&term.group) != key(group))
+}
+
 /// The evidence of all lengths mixed, with the amplitude of the best, and which that is.
 fn closest(all: &[GroupEvidence]) -> (GroupEvidence, usize) {
     let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
@@ -234,4 +240,21 @@ fn mixed(all: &[GroupEvidence]) -> GroupEvidence {
 pub(super) fn side_by_side(blocks: &[ProjectedColumns], rows: usize) -> DMatrix<f64> {
     let all: Vec<f64> = blocks.iter().flat_map(|block| block.columns.iter().copied()).collect();
     DMatrix::from_vec(rows, all.len() / rows.max(1), all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Basis, Law, Motion, Variable};
+
+    #[test]
+    fn a_memory_with_another_time_is_not_new_beside_one_of_the_same_joint() {
+        let recent = |joint, time| FreeGroup {
+            motion: Motion::Joint { joint: 0 },
+            law: Law::new(Variable::Recent { joint, time }, Basis::Cosines { low: 0.0, high: 1.0, count: 4 }),
+            of: 3,
+        };
+        let terms = [FreeTerm { group: recent(0, 15.0), variances: vec![1.0; 4] }];
+        assert!(!is_new(&recent(0, 80.0), &terms) && is_new(&recent(1, 80.0), &terms));
+    }
 }

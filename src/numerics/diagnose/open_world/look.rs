@@ -174,13 +174,19 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
                 self.change(&own.members, 0.0).free(&form.terms, sentence)
             })
         };
-        let dropped = || {
-            contested.iter().filter(|(_, own)| own.odds.log < 0.0).find_map(|((effect, place), own)| {
-                let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
-                self.change(&own.members, *WORSE).free(&[], sentence)
-            })
-        };
-        christened.or_else(freed).or_else(dropped)
+        christened.or_else(freed).or_else(|| self.dropped(contested))
+    }
+
+    /// Without a finding that has nothing to explain beside the others, or a name that is smaller than its own uncertainty.
+    pub fn dropped(&self, contested: &BTreeMap<FindingKey, ContestedName>) -> Option<ModelStep> {
+        let state = &self.sight.judged.state;
+        let named = |members: &[usize]| members.iter().any(|i| !state.causes[*i].form.cause().is_nameless());
+        let small = |members: &[usize]| named(members) && state.square_size(members).is_some_and(|size| size < 1.0);
+        let empty = |own: &ContestedName| own.odds.log < 0.0 || small(&own.members);
+        contested.iter().filter(|(_, own)| empty(own)).find_map(|((effect, place), own)| {
+            let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
+            self.change(&own.members, *WORSE).free(&[], sentence)
+        })
     }
 }
 

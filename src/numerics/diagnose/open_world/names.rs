@@ -4,7 +4,7 @@ use super::evidence::{evidence, log_sum};
 use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
-use crate::criteria::open_world::{CLEARLY, FINER, MISLED, NOTHING, PLACES, RIVALS};
+use crate::criteria::open_world::{CLEARLY, FINER, MIMICRY, MISLED, NOTHING, PLACES, RIVALS};
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -145,18 +145,26 @@ impl NameCase<'_, '_, '_, '_> {
             |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
         let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
         let odds = NameOdds {
-            none: (logs(&free) - all).exp().clamp(*MISLED, 1.0 - *MISLED),
+            none: (logs(&free) - all).exp().clamp(self.least(), 1.0 - *MISLED),
             place: (log_sum(&[here(&names), here(&free)]) - all).exp(),
             log: own.log,
             share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
         };
         let alternative = instead.best.first().filter(|form| !form.terms.is_empty());
         let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
-        let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + *CLEARLY).cloned();
+        // What has no name may act somewhere else: it was the best of its round, beside less than is known now.
+        let may_go = |form: &&FreeForm| if is_named { odds.none > 0.5 } else { form.place != place };
+        let instead = alternative.filter(may_go).filter(|form| form.log > with_more + *CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
         ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+    }
+
+    /// The least probability that it is none of the list: what the list lacks looks like a law of it at times, and no evidence tells.
+    fn least(&self) -> f64 {
+        let mimicry = self.open_world * *MIMICRY;
+        (mimicry / (mimicry + 1.0 - self.open_world)).max(*MISLED)
     }
 
     /// Evidence and fall of the squared residual of some columns of the model's causes beside a state.

@@ -32,7 +32,9 @@ pub(crate) fn settle(
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
     let mut asked_alone = false;
-    for round in 0..=*ROUNDS {
+    // What joined may leave nothing to a cause that was there before: that goes however late it is seen.
+    let mut round = 0;
+    loop {
         tell(of_the_open_world(&judged.state));
         let view = RoundView::of(&judged.state, fitter);
         let (mut odds, mut step) = (BTreeMap::new(), None);
@@ -47,9 +49,7 @@ pub(crate) fn settle(
             }
             if step.is_none() {
                 let contested = look.contested();
-                if round < *ROUNDS {
-                    step = look.exchange(&contested);
-                }
+                step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
                 odds = contested.into_iter().map(|(key, own)| (key, own.odds)).collect();
             }
         }
@@ -59,6 +59,6 @@ pub(crate) fn settle(
         let first = pool.add(new);
         set.extend(first..pool.hypotheses.len());
         judged = JudgedCauses { state, set, gains: Vec::new(), withdrawn: judged.withdrawn };
+        round += 1;
     }
-    Settled { judged, odds: BTreeMap::new() }
 }

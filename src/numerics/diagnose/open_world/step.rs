@@ -37,8 +37,8 @@ impl ModelChange<'_, '_> {
         self.with(vec![law], vec![cause], sentence)
     }
 
-    /// With a free form, or nothing. What follows time joins only where stretches of the recording that it did not see are predicted better
-    /// with it: the others go on without it.
+    /// With a free form, or nothing. What follows time joins only where stretches of the recording that it did not see are clearly
+    /// predicted better with it: the others go on without it.
     pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
         let (passing, lasting): (Vec<FreeTerm>, Vec<FreeTerm>) = terms.iter().cloned().partition(|term| term.group.drifts());
         let all = self.of_terms(terms, sentence.clone());
@@ -50,7 +50,7 @@ impl ModelChange<'_, '_> {
 
     fn predicts_stretches(&self, step: &ModelStep) -> bool {
         let [before, after] = [&self.judged.state, &step.state].map(|state| FoldErrors::of_stretches(state, self.fitter));
-        before.zip(after).is_some_and(|(before, after)| after.gain_over(&before) > 0.0)
+        before.zip(after).is_some_and(|(before, after)| after.is_better_than(&before))
     }
 
     fn of_terms(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {

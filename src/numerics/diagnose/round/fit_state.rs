@@ -7,7 +7,7 @@ use crate::criteria::noise::{ESTIMATES, GEOMETRY, REPEATS, SETTLED, SLOW};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, names, whole};
-use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
+use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
 
@@ -25,6 +25,19 @@ impl FitState {
     /// The rows with the model fitted to them.
     pub fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
         Session { data: &fitter.data, rows: &self.screening.kept, model: &self.model, fitted: &self.fitted }
+    }
+
+    /// The squared size of some causes together in their own uncertainty, a mean over their numbers; 0 where none of these is estimated,
+    /// none where there is no covariance.
+    pub fn square_size(&self, causes: &[usize]) -> Option<f64> {
+        let own = causes.iter().flat_map(|i| self.ranges[*i].clone());
+        let free: Vec<usize> = own.filter(|k| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_))).collect();
+        if free.is_empty() {
+            return Some(0.0);
+        }
+        let values: Vec<f64> = free.iter().map(|k| self.model.x[*k]).collect();
+        let square = self.fitted.covariance.as_ref()?.distance(&free, &values)?;
+        Some(square / free.len() as f64)
     }
 }
 

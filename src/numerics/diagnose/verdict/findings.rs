@@ -35,7 +35,8 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let judged = |(key, members): (FindingKey, Vec<usize>)| {
         let mut own = finding(last, &whole, key, &members);
         if let Some(odds) = last.odds.get(&key) {
-            weigh(&mut own, odds);
+            let rejected = own.effect != key.0 && own.effect == names::UNKNOWN && !last.excludes(key.0);
+            weigh(&mut own, odds, rejected);
             unnamed(&mut own, odds);
         }
         own

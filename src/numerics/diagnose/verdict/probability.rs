@@ -4,6 +4,7 @@
 //! proportion to exp(-criterion / 2 T): the criterion is -2 ln of a posterior whose noise is the residual's, so T is 1 for forms that are
 //! right; true shapes differ a little from the library's, which T allows for (`tests/reference/calibrate_probability.py`).
 
+use crate::criteria::open_world::MISLED;
 use crate::criteria::words::{FAULT, IDENTITY, TEMPERATURE};
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::types::{Finding, Probabilities, RivalCause};
@@ -14,10 +15,11 @@ pub(super) fn weigh_fault(fault: &mut Finding) {
     fault.probabilities = Probabilities { name: *FAULT, place: *FAULT, none: 1.0 - *FAULT };
 }
 
-/// Sets the probabilities of a finding and of its rivals; `odds` are those of free forms against names.
-pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds) {
+/// Sets the probabilities of a finding and of its rivals; `odds` are those of free forms against names, `rejected` says that the finding's
+/// own name was among these and cannot be.
+pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
     if finding.effect == names::UNKNOWN {
-        return weigh_nameless(finding, odds);
+        return weigh_nameless(finding, odds, rejected);
     }
     let whole = 1.0 + finding.rivals.iter().map(weight).sum::<f64>();
     for rival in &mut finding.rivals {
@@ -32,14 +34,17 @@ fn weight(rival: &RivalCause) -> f64 {
     (-loss / (2.0 * *TEMPERATURE)).exp()
 }
 
-/// Of a finding without a name: rivals share what free forms leave.
-fn weigh_nameless(finding: &mut Finding, odds: &NameOdds) {
-    let whole: f64 = finding.rivals.iter().map(weight).sum();
+/// Of a finding without a name: rivals share what free forms and a rejected name leave.
+fn weigh_nameless(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
+    let whole = f64::from(u8::from(rejected)) + finding.rivals.iter().map(weight).sum::<f64>();
+    // No law of the list does as well: what is left is that evidence misleads.
+    let of_names = if finding.rivals.is_empty() { (1.0 - odds.none).min(*MISLED) } else { 1.0 - odds.none };
     for rival in &mut finding.rivals {
-        rival.probability = (1.0 - odds.none) * weight(rival) / whole.max(f64::MIN_POSITIVE);
+        rival.probability = of_names * weight(rival) / whole;
     }
-    let none = if finding.rivals.is_empty() { 1.0 - odds.none } else { 0.0 };
-    finding.probabilities = Probabilities { name: odds.none, place: odds.place, none };
+    let name = 1.0 - finding.rivals.iter().map(|rival| rival.probability).sum::<f64>();
+    let none = if finding.rivals.is_empty() { of_names } else { 0.0 };
+    finding.probabilities = Probabilities { name: name - none, place: odds.place, none };
 }
 
 #[cfg(test)]
@@ -72,14 +77,28 @@ mod tests {
     fn names_and_none_add_up_to_one_and_equal_rivals_share_alike() {
         let odds = NameOdds { none: 0.2, place: 0.9, log: 100.0, share: 1.0 };
         let mut found = finding(200.0, &[("backlash", 1, -1.0), ("zero_shift", 2, 3.0), ("counterbalance", 2, 0.0)]);
-        weigh(&mut found, &odds);
+        weigh(&mut found, &odds, false);
         let Probabilities { name, place, none } = found.probabilities;
         let rivals: Vec<f64> = found.rivals.iter().map(|rival| rival.probability).collect();
         assert!((name + none + rivals.iter().sum::<f64>() - 1.0).abs() < 1e-12 && none == 0.2 && place == 0.9);
         assert!((name - rivals[0]).abs() < 1e-12 && rivals[1] < rivals[0] && rivals[2] < rivals[1]);
         found.effect = names::UNKNOWN;
-        weigh(&mut found, &odds);
+        weigh(&mut found, &odds, false);
         let sum: f64 = found.rivals.iter().map(|rival| rival.probability).sum();
         assert!((found.probabilities.name - 0.2).abs() < 1e-12 && (sum - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_rejected_name_would_have_is_that_it_is_none_of_the_list() {
+        let odds = NameOdds { none: 0.02, place: 0.9, log: 100.0, share: 1.0 };
+        let mut alone = finding(200.0, &[]);
+        alone.effect = names::UNKNOWN;
+        weigh(&mut alone, &odds, true);
+        assert_eq!((alone.probabilities.name, alone.probabilities.none), (0.98, 0.02));
+        let mut beside = finding(200.0, &[("backlash", 1, 0.01), ("zero_shift", 2, 0.01)]);
+        beside.effect = names::UNKNOWN;
+        weigh(&mut beside, &odds, true);
+        // Three names share alike, and one of them cannot be.
+        assert!((beside.probabilities.name - (0.02 + 0.98 / 3.0)).abs() < 0.01, "{:?}", beside.probabilities);
     }
 }
