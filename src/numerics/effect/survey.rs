@@ -24,6 +24,8 @@ pub struct Survey<'a> {
     pub time: [f64; 2],
     /// First temperature, C, where recorded.
     pub reference_c: Option<f64>,
+    /// First and last boundary about the only change of the payload, s; none where it does not change or changes more often.
+    payload_change: Option<[f64; 2]>,
 }
 
 /// At either end of a recording so many rows must lie beyond a change point: fewer are a few wrong points.
@@ -51,7 +53,27 @@ impl<'a> Survey<'a> {
         let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
         let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
         let reference_c = rows.first().and_then(|row| data.temperature(*row));
-        Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c }
+        let mut out = Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c, payload_change: None };
+        out.payload_change = out.only_payload_change().and_then(|at| {
+            let near = out.changes_near(at);
+            Some([*near.first()?, *near.last()?])
+        });
+        out
+    }
+
+    /// When the payload changes (s), from light to heavy or back, where it does so once.
+    fn only_payload_change(&self) -> Option<f64> {
+        let heavy = self.heavy_payload();
+        let mut by_time: Vec<(f64, bool)> =
+            self.rows.iter().map(|row| (self.data.time(*row), self.data.payload[*row] > heavy)).collect();
+        by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut changes = by_time.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| 0.5 * (pair[0].0 + pair[1].0));
+        changes.next().filter(|_| changes.next().is_none())
+    }
+
+    /// Whether what steps at a time may as well follow the payload, which changes once, and about then.
+    pub fn is_payload_change(&self, time: f64) -> bool {
+        self.payload_change.is_some_and(|[first, last]| (first..=last).contains(&time))
     }
 
     /// Joints of the arm.

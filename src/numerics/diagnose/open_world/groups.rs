@@ -7,6 +7,7 @@ use crate::criteria::open_world::{
 use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
 const ARROWS: [[i8; 3]; 13] = [
@@ -191,7 +192,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
                 }
             }
             if steps(motion) {
-                let all: Vec<f64> = survey.changes(*STEPS).collect();
+                let joint = matches!(motion, Motion::Joint { .. });
+                let all: Vec<f64> = survey.changes(*STEPS).filter(|at| !(joint && survey.is_payload_change(*at))).collect();
                 let step =
                     |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
                 out.extend(all.iter().map(step));
@@ -294,13 +296,19 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     let passing = || [(Variable::Time, *FINE), (Variable::Temperature, *COARSE), (Variable::Payload, *COARSE)].into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
-    // What a joint's travel leaves behind.
-    let moved = |joint: usize| {
-        let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
-        let fades = FADING.map(|time| Variable::Recent { joint, time });
+    // What a joint's travel leaves behind: with every number where it is the place's own joint, with the middle one elsewhere, which is refined.
+    let memory = |joint: usize, numbers: Range<usize>| {
+        let sticks = LIMITS[numbers.clone()].to_vec();
+        let sticks = sticks.into_iter().map(move |share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
+        let fades = FADING[numbers].to_vec().into_iter().map(move |time| Variable::Recent { joint, time });
         let clocked = survey.data.has_clock();
-        let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
+        let all = sticks.chain(fades.filter(move |_| clocked)).chain([Variable::Move { joint }]);
         all.map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }))
+    };
+    let middle = LIMITS.len() / 2;
+    let moved = |own: usize| {
+        let numbers = move |joint| if joint == own { 0..LIMITS.len() } else { middle..middle + 1 };
+        (0..joints).flat_map(move |joint| memory(joint, numbers(joint)))
     };
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
@@ -325,7 +333,14 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
             let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
-            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
+            let own: Vec<_> = sight
+                .into_iter()
+                .chain(passing())
+                .chain(angles(joints))
+                .chain(sides())
+                .chain(moved(joints))
+                .chain(space)
+                .collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
         Place::Tool => {

@@ -7,7 +7,7 @@ use super::names::{
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use crate::criteria::open_world::{LOUDER, SIZE, STRONG, WORSE};
+use crate::criteria::open_world::{LOUDER, SEEN, SHARED, SIZE, STRONG, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -138,6 +138,17 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         step
     }
 
+    /// What the criterion loses without some causes.
+    fn loss_without(&self, members: &[usize]) -> f64 {
+        let set = &self.sight.judged.set;
+        let bic = |with: &dyn Fn(usize) -> bool| {
+            let mut some: Vec<usize> = (0..set.len()).filter(|i| with(*i)).map(|i| set[i]).collect();
+            some.sort_unstable();
+            self.pool.bic(&some)
+        };
+        bic(&|i| !members.contains(&i)) - bic(&|_| true)
+    }
+
     /// The odds of every finding.
     pub fn contested(&self) -> BTreeMap<FindingKey, ContestedName> {
         let blocks = &self.sight.blocks;
@@ -177,12 +188,16 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         christened.or_else(freed).or_else(|| self.dropped(contested))
     }
 
-    /// Without a finding that has nothing to explain beside the others, or a name that is smaller than its own uncertainty.
+    /// Without a finding that has nothing to explain beside the others; without a name that is smaller than its own uncertainty, or hardly
+    /// seen beside a free form, or one of many that would do there: what a free form does not follow looks like a small law of the list.
     pub fn dropped(&self, contested: &BTreeMap<FindingKey, ContestedName>) -> Option<ModelStep> {
         let state = &self.sight.judged.state;
-        let named = |members: &[usize]| members.iter().any(|i| !state.causes[*i].form.cause().is_nameless());
-        let small = |members: &[usize]| named(members) && state.square_size(members).is_some_and(|size| size < 1.0);
-        let empty = |own: &ContestedName| own.odds.log < 0.0 || small(&own.members);
+        let nameless = |i: &usize| state.causes[*i].form.cause().is_nameless();
+        let beside_free = (0..state.causes.len()).any(|i| nameless(&i));
+        let weak = |own: &ContestedName| beside_free && (self.loss_without(&own.members) < *SEEN || own.share_of_names < *SHARED);
+        let small = |members: &[usize]| state.square_size(members).is_some_and(|size| size < 1.0);
+        let named = |members: &[usize]| !members.iter().all(nameless);
+        let empty = |own: &ContestedName| own.odds.log < 0.0 || named(&own.members) && (small(&own.members) || weak(own));
         contested.iter().filter(|(_, own)| empty(own)).find_map(|((effect, place), own)| {
             let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
             self.change(&own.members, *WORSE).free(&[], sentence)

@@ -34,6 +34,8 @@ pub(super) struct ContestedName {
     pub instead: Option<FreeForm>,
     /// A law of the list that says more than what has no name, by its number among the hypotheses.
     pub named: Option<usize>,
+    /// What the finding's own name has of the evidence of all names.
+    pub share_of_names: f64,
 }
 
 /// What the free forms of all places say beside a state.
@@ -158,7 +160,13 @@ impl NameCase<'_, '_, '_, '_> {
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
-        ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+        ContestedName {
+            members: named.members.clone(),
+            odds,
+            instead,
+            named: best.filter(better).map(|rival| rival.at),
+            share_of_names: (mine - logs(&names)).exp(),
+        }
     }
 
     /// The least probability that it is none of the list: what the list lacks looks like a law of it at times, and no evidence tells.
