@@ -9,7 +9,8 @@ const CHANGES: usize = 40;
 pub(super) const MEASURE: Measure =
     Measure { rank: 3, advice: "return to a few anchor poses with different first joints every half hour" };
 
-/// Motions at each of the change points. A joint that steps when the payload changes follows the payload: nobody touched it.
+/// Motions at each of the change points. A joint or a tool that steps when the payload changes follows the
+/// payload; what stands before the arm may have been touched then.
 pub(super) fn propose(cause: &'static dyn Cause, motions: &[Motion], survey: &Survey) -> Vec<Hypothesis> {
     let law = |at| Law::new(Variable::Time, Basis::After { at });
     let terms = survey.changes(CHANGES).flat_map(|at| motions.iter().map(move |motion| Term::new(cause, *motion, law(at))));
@@ -26,6 +27,6 @@ pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
 
 /// Whether no change of the payload would do the same.
 fn is_its_own(term: &Term, survey: &Survey) -> bool {
-    let by_payload = |at| matches!(term.motion(), Motion::Joint { .. }) && survey.is_payload_change(at);
+    let by_payload = |at| !matches!(term.motion(), Motion::Base { .. }) && survey.is_payload_change(at);
     !matches!(term.basis(), Basis::After { at } if by_payload(at))
 }

@@ -192,8 +192,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
                 }
             }
             if steps(motion) {
-                let joint = matches!(motion, Motion::Joint { .. });
-                let all: Vec<f64> = survey.changes(*STEPS).filter(|at| !(joint && survey.is_payload_change(*at))).collect();
+                let own = |at: &f64| matches!(motion, Motion::Base { .. }) || !survey.is_payload_change(*at);
+                let all: Vec<f64> = survey.changes(*STEPS).filter(own).collect();
                 let step =
                     |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
                 out.extend(all.iter().map(step));

@@ -3,16 +3,17 @@
 use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{AroundGroups, FreeForm, PlaceGroups, side_by_side};
 use super::names::{
-    ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places, unit_variances,
+    ContestedName, NameCase, NameOdds, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places,
+    unit_variances,
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use crate::criteria::open_world::{LOUDER, SEEN, SHARED, SIZE, STRONG, WORSE};
+use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
-use crate::effect::{Place, Survey};
+use crate::effect::{Place, Survey, names};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -138,6 +139,24 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         step
     }
 
+    /// The odds of a finding; of a weak name none of the list is right but for what evidence misleads.
+    pub fn odds(&self, key: &FindingKey, own: &ContestedName) -> NameOdds {
+        let none = if self.is_weak(key, own) { 1.0 - *MISLED } else { own.odds.none };
+        NameOdds { none, ..own.odds }
+    }
+
+    fn is_nameless(&self, cause: usize) -> bool {
+        self.sight.judged.state.causes[cause].form.cause().is_nameless()
+    }
+
+    /// Whether a name is hardly seen beside a free form, or one of many that would do there: what a free form does not follow looks like a
+    /// small law of the list.
+    fn is_weak(&self, key: &FindingKey, own: &ContestedName) -> bool {
+        let beside_free = (0..self.sight.judged.set.len()).any(|i| self.is_nameless(i));
+        let seen = || self.loss_without(&own.members) >= *SEEN && own.share_of_names >= *SHARED;
+        beside_free && key.0 != names::UNKNOWN && !seen()
+    }
+
     /// What the criterion loses without some causes.
     fn loss_without(&self, members: &[usize]) -> f64 {
         let set = &self.sight.judged.set;
@@ -188,17 +207,12 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         christened.or_else(freed).or_else(|| self.dropped(contested))
     }
 
-    /// Without a finding that has nothing to explain beside the others; without a name that is smaller than its own uncertainty, or hardly
-    /// seen beside a free form, or one of many that would do there: what a free form does not follow looks like a small law of the list.
+    /// Without a finding that has nothing to explain beside the others; without a name that is smaller than its own uncertainty, or weak.
     pub fn dropped(&self, contested: &BTreeMap<FindingKey, ContestedName>) -> Option<ModelStep> {
         let state = &self.sight.judged.state;
-        let nameless = |i: &usize| state.causes[*i].form.cause().is_nameless();
-        let beside_free = (0..state.causes.len()).any(|i| nameless(&i));
-        let weak = |own: &ContestedName| beside_free && (self.loss_without(&own.members) < *SEEN || own.share_of_names < *SHARED);
         let small = |members: &[usize]| state.square_size(members).is_some_and(|size| size < 1.0);
-        let named = |members: &[usize]| !members.iter().all(nameless);
-        let empty = |own: &ContestedName| own.odds.log < 0.0 || named(&own.members) && (small(&own.members) || weak(own));
-        contested.iter().filter(|(_, own)| empty(own)).find_map(|((effect, place), own)| {
+        let weak = |key: &FindingKey, own| key.0 != names::UNKNOWN && (small(&contested[key].members) || self.is_weak(key, own));
+        contested.iter().filter(|(key, own)| own.odds.log < 0.0 || weak(key, own)).find_map(|((effect, place), own)| {
             let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
             self.change(&own.members, *WORSE).free(&[], sentence)
         })

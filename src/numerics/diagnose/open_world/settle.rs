@@ -50,7 +50,7 @@ pub(crate) fn settle(
             if step.is_none() {
                 let contested = look.contested();
                 step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
-                odds = contested.into_iter().map(|(key, own)| (key, own.odds)).collect();
+                odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
             }
         }
         let Some(ModelStep { state, kept, new, sentence }) = step else { return Settled { judged, odds } };
