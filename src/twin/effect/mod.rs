@@ -114,7 +114,7 @@ pub struct State<'a> {
 }
 
 /// An effect of the twin.
-trait Act {
+trait Act: Stated {
     /// Adds what the effect does in `state` to `motion`.
     fn act(&self, state: &State, motion: &mut Motion);
     /// Changes what the arm is for the whole recording: masses and centres.
@@ -137,6 +137,10 @@ trait Act {
     fn moves_only(&self) -> bool {
         self.later() != 0.0
     }
+}
+
+/// The numbers of an effect.
+trait Stated {
     /// The joint or link that it sits on, from 1, where it has one.
     fn seat(&self) -> Option<usize> {
         None
@@ -145,6 +149,82 @@ trait Act {
     fn scale(&mut self, by: f64);
     /// Its true numbers in canonical names.
     fn truth(&self) -> Vec<TrueValue>;
+}
+
+/// A number, or a vector, that the size of an effect is in proportion to.
+trait Size {
+    fn scale(&mut self, by: f64);
+}
+
+impl Size for f64 {
+    fn scale(&mut self, by: f64) {
+        *self *= by;
+    }
+}
+
+impl<const N: usize> Size for [f64; N] {
+    fn scale(&mut self, by: f64) {
+        self.iter_mut().for_each(|number| *number *= by);
+    }
+}
+
+/// Declares an effect as it is written in YAML: its numbers; its canonical name; its place, which is the joint or link that a number of
+/// it names (with the end of its tag), or a tag and a place; the numbers that its size is in proportion to; its true numbers as name,
+/// unit and value.
+macro_rules! effect {
+    (@type $(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* } $by:ident $($size:ident)+) => {
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        $(#[$meta])*
+        #[serde(deny_unknown_fields)]
+        pub struct $name { $($fields)* }
+        impl $name {
+            fn scale_by(&mut self, $by: f64) {
+                $( $crate::effect::Size::scale(&mut self.$size, $by); )+
+            }
+        }
+    };
+    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
+     $effect:literal at $seat:ident $($end:literal)?, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
+        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+        impl $crate::effect::Stated for $name {
+            fn seat(&self) -> Option<usize> {
+                Some(self.$seat)
+            }
+            fn scale(&mut self, by: f64) {
+                self.scale_by(by);
+            }
+            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
+                let tag = format!(concat!("{}{}", $($end)?), &stringify!($seat)[..1], $me.$seat);
+                $crate::true_value::true_values($effect, &tag, &format!("{} {}", stringify!($seat), $me.$seat), $numbers)
+            }
+        }
+    };
+    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
+     $effect:literal of $tag:literal $place:literal, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
+        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+        impl $crate::effect::Stated for $name {
+            fn scale(&mut self, by: f64) {
+                self.scale_by(by);
+            }
+            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
+                $crate::true_value::true_values($effect, $tag, $place, $numbers)
+            }
+        }
+    };
+}
+use effect;
+
+/// A ripple as two amplitudes, as estimators write it.
+fn sine_and_cosine(order: f64, unit: &'static str, amplitude: f64, phase_deg: f64) -> [(String, &'static str, f64); 2] {
+    let (sine, cosine) = phase_deg.to_radians().sin_cos();
+    [(format!("sin{order}"), unit, amplitude * cosine), (format!("cos{order}"), unit, amplitude * sine)]
+}
+
+/// A rigid step, axis by axis.
+fn by_axis(shift_um: Vector, turn_arcsec: Vector) -> impl Iterator<Item = (&'static str, &'static str, f64)> {
+    let names = [("shift_x", "turn_x"), ("shift_y", "turn_y"), ("shift_z", "turn_z")];
+    let axes = names.into_iter().zip(shift_um.into_iter().zip(turn_arcsec));
+    axes.flat_map(|((shift, turn), (moved, turned))| [(shift, "um", moved), (turn, "arcsec", turned)])
 }
 
 /// Declares the list of effects: the name in the YAML is the type's name in snake case.
