@@ -37,6 +37,7 @@ impl Cause for AnchorShift {
             size: "any",
             confounded: "base_frame",
             needs: "distances, sockets, planes or spheres",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -34,6 +34,7 @@ impl Cause for BaseCompliance {
             size: "0.01 to 1 urad/Nm",
             confounded: "joint_compliance of joint 2, link_compliance of link 1",
             needs: "link masses",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -49,6 +49,7 @@ impl Cause for BaseFrame {
             size: "any",
             confounded: "tool_offset, joint_offset of the first joint",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -21,6 +21,7 @@ impl Cause for CouplingRatio {
             size: "1e-5 to 1e-2",
             confounded: "axis_wobble, link_geometry",
             needs: "a wide travel of joint A",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -185,7 +185,7 @@ impl Form {
     pub fn is_of_the_measurement(&self) -> bool {
         let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
         let instrument = || self.place() == Place::Tracker;
-        self.cause().is_of_the_measurement() || (self.cause().is_nameless() && (passing() || instrument()))
+        self.cause().about().of_the_measurement || (self.cause().is_nameless() && (passing() || instrument()))
     }
 }
 

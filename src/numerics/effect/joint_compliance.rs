@@ -23,6 +23,8 @@ impl Cause for JointCompliance {
             size: "0.1 to 10 urad/Nm",
             confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
             needs: "link masses, motor currents, or many postures",
+            absorbs_residual: &[names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -58,10 +60,6 @@ impl Cause for JointCompliance {
                  not give"
             ),
         }
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -58,6 +58,12 @@ impl Cause for JointHardening {
             size: "5 to 50 % of the wind-up",
             confounded: "joint_compliance, backlash",
             needs: "link masses and two payloads",
+            measure: Some(Measure {
+                rank: 7,
+                advice: "measure with a third payload between none and full, and with joints near their largest load",
+            }),
+            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -86,10 +92,6 @@ impl Cause for JointHardening {
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::BACKLASH, names::UNKNOWN]
-    }
-
     /// A joint has one wind-up.
     fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
         own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
@@ -100,11 +102,6 @@ impl Cause for JointHardening {
     }
 
     /// From a wind-up in proportion.
-    fn measure(&self) -> Option<Measure> {
-        let advice = "measure with a third payload between none and full, and with joints near their largest load";
-        Some(Measure { rank: 7, advice })
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(BentWindup::deserialize(body).map(Form::from))
     }

@@ -46,6 +46,9 @@ impl Cause for JointLogLag {
             size: "0.1 to 5 % of the move; 0.5 to 20 ms",
             confounded: "backlash; viscous_windup where one joint moves alone",
             needs: "rows in the order of measurement; joint velocities",
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -102,16 +105,8 @@ impl Cause for JointLogLag {
         clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
     }
 
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Lag::deserialize(body).map(Form::from))
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }
 

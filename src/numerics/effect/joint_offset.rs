@@ -16,6 +16,7 @@ impl Cause for JointOffset {
             size: "0.1 to 5 mrad",
             confounded: "base_frame, link_geometry",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 

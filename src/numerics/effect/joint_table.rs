@@ -40,6 +40,8 @@ impl Cause for JointTable {
             size: "5 to 200 arcsec",
             confounded: "gear_cyclic",
             needs: "many points",
+            absorbs_residual: &[names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -75,10 +77,6 @@ impl Cause for JointTable {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} has a repeatable error of no simple form, kept as a table", summary.place)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
     }
 }
 

@@ -45,6 +45,7 @@ impl Cause for LinkCompliance {
             size: "0.05 to 1 urad/Nm",
             confounded: "joint_compliance of either end",
             needs: "link masses",
+            ..CauseDescription::PLAIN
         }
     }
 

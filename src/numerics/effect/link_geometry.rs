@@ -27,6 +27,7 @@ impl Cause for LinkGeometry {
             size: "0.1 to 1 mm, 0.1 to 1 mrad",
             confounded: "joint_offset, tool_offset",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -2,8 +2,7 @@
 
 use super::spring::{MEASURE, Spring};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -30,6 +29,8 @@ impl Cause for LinkMass {
             size: "3 to 20 %",
             confounded: "counterbalance, payload_error",
             needs: "link masses and motor currents",
+            measure: Some(MEASURE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -45,10 +46,6 @@ impl Cause for LinkMass {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -2,8 +2,8 @@
 
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -34,6 +34,8 @@ impl Cause for PayloadError {
             size: "3 to 30 %",
             confounded: "joint_hardening",
             needs: "rows with and without the payload",
+            measure: Some(MEASURE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -62,10 +64,6 @@ impl Cause for PayloadError {
             }
             None => "the payload is not what was declared".to_string(),
         }
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

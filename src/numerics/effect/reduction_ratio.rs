@@ -20,6 +20,7 @@ impl Cause for ReductionRatio {
             size: "1e-5 to 1e-3",
             confounded: "joint_compliance, gear_cyclic of order 1",
             needs: "a wide travel of the joint",
+            ..CauseDescription::PLAIN
         }
     }
 

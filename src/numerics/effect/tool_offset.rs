@@ -35,6 +35,7 @@ impl Cause for ToolOffset {
             size: "any",
             confounded: "link_geometry of the last link",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 
