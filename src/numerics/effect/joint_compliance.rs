@@ -3,6 +3,7 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`]; where nobody knows the
 //! masses, gravity's torque per first moment, see [`UnweighedWindup`].
 
+use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
@@ -80,17 +81,7 @@ pub struct Windup {
 }
 
 impl Placed for Windup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint }]
-    }
+    placed! { self: Place::Joint(self.joint), &JointCompliance, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let prior_sigma = match self.load {
@@ -124,10 +115,6 @@ impl Placed for Windup {
 
     fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, *p.first()?))
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }
 

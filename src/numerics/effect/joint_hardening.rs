@@ -1,5 +1,6 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
+use super::form::placed;
 use super::joint_table::PLAUSIBLE;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
@@ -161,17 +162,7 @@ impl BentWindup {
 }
 
 impl Placed for BentWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointHardening
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint }]
-    }
+    placed! { self: Place::Joint(self.joint), &JointHardening, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];
@@ -255,10 +246,6 @@ impl Placed for BentWindup {
             HardeningLaw::Power { exponent, .. } => Some(format!("it grows by the load to the power of {}", figure(exponent, 1))),
             HardeningLaw::Curve { .. } => None,
         }
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {

@@ -1,5 +1,6 @@
 //! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
+use super::form::placed;
 use super::spring::{MEASURE, Spring};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
@@ -54,17 +55,7 @@ impl Cause for LinkMass {
 }
 
 impl Placed for WrongLinkMass {
-    fn place(&self) -> Place {
-        Place::Links(self.link, self.link)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &LinkMass
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
-    }
+    placed! { self: Place::Links(self.link, self.link), &LinkMass, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mass = ("mass".into(), Unit::Kilogram, 1e4);
@@ -101,9 +92,5 @@ impl Placed for WrongLinkMass {
 
     fn is_of_torque_model(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }

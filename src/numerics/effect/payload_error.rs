@@ -1,5 +1,6 @@
 //! `payload_error`: the payload's mass (and first moment) differs from what was declared, where one is carried.
 
+use super::form::placed;
 use super::spring::MEASURE;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
@@ -72,17 +73,7 @@ impl Cause for PayloadError {
 }
 
 impl Placed for WrongPayload {
-    fn place(&self) -> Place {
-        Place::Tool
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &PayloadError
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![if self.tool { Variable::ArmLoad } else { Variable::Payload }]
-    }
+    placed! { self: Place::Tool, &PayloadError, [if self.tool { Variable::ArmLoad } else { Variable::Payload }], self }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
@@ -121,9 +112,5 @@ impl Placed for WrongPayload {
 
     fn is_of_torque_model(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }
