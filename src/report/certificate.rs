@@ -5,7 +5,7 @@ use super::errors::before;
 use super::findings::wrong_setup;
 use super::limits::{Judgement, judged};
 use super::number::{count, fixed, mm};
-use crate::table::{StatisticsRow, VerdictRow};
+use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -25,6 +25,7 @@ pub(super) fn certificate(
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
     let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
     let subject = [("robot".to_string(), robot.to_string())];
+    let limit = |(row, found): (&AcceptanceRow, f64)| json!([row.figure, mm(found), mm(row.limit_mm), row.kept]);
     let given = identity.iter().map(|(name, value)| (name.clone(), value.clone()));
     json!({
         // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
@@ -42,9 +43,9 @@ pub(super) fn certificate(
         // Figures that stand beside the table.
         "uncertainty": after.map(uncertainty).unwrap_or_default(),
         // Figure, found, allowed, whether it is kept.
-        "limits": judgement.map(|judgement| judgement.lines.clone()).unwrap_or_default(),
+        "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
         "conditions": conditions(tables),
-        "not_observable": diagnosis.map(|row| row.not_observable.lines().collect::<Vec<_>>()).unwrap_or_default(),
+        "not_observable": diagnosis.map(|row| tables.said(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
     })
 }
 

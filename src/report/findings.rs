@@ -4,7 +4,7 @@ use super::Tables;
 use super::axis::{Area, Scale, baseline, label, name_x, name_y};
 use super::number::{count, mm, significant};
 use super::svg::Svg;
-use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, formula_in_words};
+use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, VerdictTopic, formula_in_words};
 use crate::units::Unit;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -44,7 +44,6 @@ struct FindingView {
 /// None where the pipeline made no diagnosis.
 pub(super) fn section(tables: &Tables) -> Option<Value> {
     let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
-    let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
     let figure = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), mm);
     let errors = |name: &str, mean, rms, max| [name.to_string(), figure(mean), figure(rms), figure(max)];
     let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
@@ -74,10 +73,10 @@ pub(super) fn section(tables: &Tables) -> Option<Value> {
         "findings": findings,
         // What each figure of the evidence means.
         "meanings": meanings,
-        "next": verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
+        "next": tables.said(&verdict.step, VerdictTopic::NextMeasurement),
         "signature": verdict.signature,
         // Findings that were taken back.
-        "withdrawn": verdict.withdrawn.as_deref().map(lines).unwrap_or_default(),
+        "withdrawn": tables.said(&verdict.step, VerdictTopic::Withdrawn),
         "suspects": suspects
             .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
             .collect::<Vec<_>>(),

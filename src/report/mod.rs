@@ -31,8 +31,9 @@ pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction, Recording,
-    Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
+    Acceptance, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction,
+    Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic,
+    Withdrawn,
 };
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -68,6 +69,8 @@ pub struct Tables {
     /// Of every diagnosis.
     pub verdict: Vec<Verdict>,
     /// Of every diagnosis.
+    pub sentences: Vec<VerdictSentences>,
+    /// Of every diagnosis.
     pub findings: Vec<Findings>,
     /// Of every diagnosis.
     pub finding_numbers: Vec<FindingNumbers>,
@@ -83,6 +86,13 @@ pub struct Tables {
     pub standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
     pub withdrawn: Vec<Withdrawn>,
+}
+
+impl Tables {
+    /// What the diagnosis of a step says of a topic.
+    fn said(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
+        self.sentences.iter().flat_map(|table| table.about(step, topic)).collect()
+    }
 }
 
 /// What the person who asked for the report chose.
@@ -107,6 +117,8 @@ pub struct Pages {
     pub html: String,
     /// The same for programs.
     pub json: String,
+    /// The user's limits and what was found.
+    pub acceptance: Acceptance,
 }
 
 /// The report; fails where `options.set` is no held-out set.
@@ -137,5 +149,6 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         "robot": robot,
     });
     let html = page::render("report.html", include_str!("report.html"), &page)?;
-    Ok(Pages { html: options.language.page(html).html, json })
+    let acceptance = Acceptance(judgement.map(|judgement| judgement.limits).unwrap_or_default());
+    Ok(Pages { html: options.language.page(html).html, json, acceptance })
 }

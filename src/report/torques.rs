@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves, InertialRow, Inertials,
     JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict, TorqueVerdictRow,
+    TorqueVerdict, TorqueVerdictRow, VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
@@ -18,6 +18,8 @@ pub struct TorqueTables {
     pub robot: Robot,
     /// The verdict.
     pub verdict: TorqueVerdict,
+    /// What the diagnosis says beside it.
+    pub sentences: VerdictSentences,
     /// Strongest first.
     pub findings: TorqueFindings,
     /// Their numbers.
@@ -45,6 +47,7 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
     let verdict = tables.verdict.0.first();
     let verdict = verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
     let robot = data::robot_name(&tables.robot);
+    let said = |topic| tables.sentences.about(&verdict.step, topic);
     let page = json!({
         "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
         "policy": "",
@@ -57,14 +60,14 @@ pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String>
         "sentence": format!("{}: {}", verdict.verdict.replace('_', " "), verdict.statement),
         "facts": facts(verdict),
         "findings": findings(tables),
-        "withdrawn": verdict.withdrawn.as_deref().map(|text| text.lines().collect::<Vec<_>>()).unwrap_or_default(),
+        "withdrawn": said(VerdictTopic::Withdrawn),
         "errors": errors(&tables.joints),
         "pictures": (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect::<Vec<_>>(),
         "contacts": contacts(&tables.contacts),
         "inertials": inertials(&tables.inertials),
         "bodies": bodies(&tables.consistency),
-        "not_observable": verdict.not_observable.lines().collect::<Vec<_>>(),
-        "remarks": verdict.remarks.as_deref().map(|text| text.lines().collect::<Vec<_>>()).unwrap_or_default(),
+        "not_observable": said(VerdictTopic::NotObservable),
+        "remarks": said(VerdictTopic::Remark),
         "hashes": &tables.hashes,
     });
     page::render("torques.html", include_str!("torques.html"), &page)

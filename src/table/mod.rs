@@ -37,7 +37,7 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
         #[doc = concat!("A row of the table `", $kind, "`.")]
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
         pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
         $(#[$doc])*
         #[derive(Debug, Clone, Default, PartialEq)]
@@ -101,6 +101,7 @@ mod torque_findings;
 mod torque_parameters;
 mod torque_verdict;
 mod verdict;
+mod verdict_sentences;
 
 pub use findings::is_separable_by_poses;
 pub use forms::formula_in_words;
@@ -111,8 +112,10 @@ pub use recording::{Recording, SOURCE as SIGMA_SOURCE, columns as recording_colu
 pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 pub(crate) use suspects::slip;
 pub use torque_course::TorqueCourse;
+pub use verdict_sentences::VerdictTopic;
 
 tables! {
+    acceptance => Acceptance of AcceptanceRow,
     body_consistency => BodyConsistencies of BodyConsistencyRow,
     changes => Changes of ChangeRow,
     contacts => Contacts of ContactRow,
@@ -159,4 +162,5 @@ tables! {
     training => Training of TrainingRow,
     truth => Truth of TruthRow,
     verdict => Verdict of VerdictRow,
+    verdict_sentences => VerdictSentences of VerdictSentenceRow,
 }

@@ -14,7 +14,6 @@ impl TorqueVerdictRow {
 impl TorqueVerdict {
     /// The verdict of the stage `step`; `from_current` where motor currents were recorded.
     pub fn of(step: &str, diagnosis: &TorqueDiagnosis, from_current: bool) -> Self {
-        let lines = |all: &[String]| (!all.is_empty()).then(|| all.join("\n"));
         let (inertials, base_parameters) = match diagnosis.basis {
             InertialBasis::Declared => ("declared", None),
             InertialBasis::Free(count) => ("free", Some(count as i64)),
@@ -32,9 +31,6 @@ impl TorqueVerdict {
             held_out: diagnosis.held_out,
             before_nrmse: diagnosis.before.nrmse_mean,
             after_nrmse: diagnosis.after.nrmse_mean,
-            not_observable: diagnosis.not_observable.join("\n"),
-            withdrawn: lines(&diagnosis.withdrawn),
-            remarks: lines(&diagnosis.remarks),
         }])
     }
 }

@@ -62,10 +62,7 @@ impl Verdict {
             repeatability_rad: diagnosis.repeatability.sigma,
             repeats: diagnosis.repeatability.repeats as i64,
             points: diagnosis.kept.len() as i64,
-            not_observable: diagnosis.not_observable.join("\n"),
             signature: diagnosis.signature.clone(),
-            next_measurements: (!diagnosis.next_measurements.is_empty()).then(|| diagnosis.next_measurements.join("\n")),
-            withdrawn: (!diagnosis.withdrawn.is_empty()).then(|| diagnosis.withdrawn.join("\n")),
             clock: Some(if diagnosis.clock { "s" } else { "row" }.into()),
         }])
     }
