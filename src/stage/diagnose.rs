@@ -219,7 +219,7 @@ impl Stage for Diagnose {
 
 /// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
 fn remark(diagnosis: &mut Diagnosis, data: &Measurements, recording: &Recording, context: &Context) {
-    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
+    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.has_point(*row)).collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
     let events = brought::events(&diagnosis.model, &diagnosis.fitted, data, recording, &diagnosis.kept);
     for line in rounded.into_iter().chain(events) {

@@ -216,7 +216,7 @@ impl Parameters {
         let targets = self.placed(names::TOOL_OFFSET);
         if targets.keys().any(|name| !name.is_empty()) || turned("") {
             let target = |(name, stand): (String, Pose)| Target {
-                seat: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
+                mounting: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
                 oriented: turned(&name),
                 name,
             };

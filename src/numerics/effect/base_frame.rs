@@ -53,7 +53,7 @@ impl Cause for BaseFrame {
         }
     }
 
-    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(BasePlacement { start: setting.base }))
     }
 }

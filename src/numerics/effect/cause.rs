@@ -71,7 +71,7 @@ pub trait Cause: Sync {
     }
 
     /// The effect of the whole arm, for causes that are identified, not searched for.
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         None
     }
 
@@ -217,13 +217,13 @@ pub fn cause(name: &str) -> Option<&'static dyn Cause> {
 
 /// The effect of the whole arm of a name, if there is one.
 pub fn whole(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-    cause(name)?.whole(setting)
+    cause(name)?.arm_effect(setting)
 }
 
 /// Causes that are effects of the whole arm, which are identified; all others are searched for.
 pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    CAUSES.iter().copied().filter(move |cause| cause.whole(&setting).is_some())
+    CAUSES.iter().copied().filter(move |cause| cause.arm_effect(&setting).is_some())
 }
 
 /// Every hypothesis of every cause.

@@ -25,7 +25,7 @@ impl Cause for CouplingRatio {
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(DeclaredCouplings))
     }
 

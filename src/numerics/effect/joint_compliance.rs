@@ -29,7 +29,7 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Windups(setting.load)))
     }
 

@@ -51,7 +51,7 @@ fn next(cause: &dyn Cause) -> String {
 
 fn found_by(cause: &dyn Cause) -> String {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    let identified = cause.whole(&setting).is_some();
+    let identified = cause.arm_effect(&setting).is_some();
     let stays = if cause.about().of_the_measurement { "; it belongs to the measurement and is not compensated" } else { "" };
     format!("{}{stays}", if identified { "`identify`; `diagnose` has it in its base model or names it" } else { "`diagnose`" })
 }
