@@ -29,7 +29,7 @@
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
 //! | [`diff`] | two tables or two runs compared | raw, store |
-//! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
+//! | [`table`] | Rust values <-> checked columns; rows are made of the schema files | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |

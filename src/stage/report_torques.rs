@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::report::{TorqueTables, torque_page};
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Labelled, Stage, reads, writes};
 use crate::table::{
     BodyConsistencies, Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques, Robot, Table, TorqueCourse,
     TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, VerdictSentences,
@@ -23,7 +23,7 @@ reads! {
     pub struct ReportTorquesReads {
         robot: Robot,
         verdict: TorqueVerdict,
-        sentences: VerdictSentences,
+        sentences: Vec<Labelled<VerdictSentences>>,
         findings: TorqueFindings,
         numbers: TorqueNumbers,
         rivals: TorqueRivals,
@@ -59,7 +59,8 @@ impl Stage for ReportTorques {
         let tables = TorqueTables {
             robot: reads.robot,
             verdict: reads.verdict,
-            sentences: reads.sentences,
+            // Other diagnoses of the pipeline have theirs: each is asked for by its step.
+            sentences: VerdictSentences(reads.sentences.into_iter().flat_map(|of| of.table.0).collect()),
             findings: reads.findings,
             numbers: reads.numbers,
             rivals: reads.rivals,

@@ -1,7 +1,7 @@
-//! The bridge between Parquet columns and Rust values: one file per table, one schema file each in `schemas/`.
+//! The bridge between Parquet columns and Rust values: each table has a schema file in `schemas/`.
 //!
-//! Most tables are a list of rows whose columns are taken from the schema file; only those with columns for each joint are written
-//! by hand. A file of this folder is what a table is made of, or what is made of it.
+//! Most tables are a list of rows, and a row is a struct whose fields are the columns of the schema file (build.rs reads it); only
+//! tables with columns for each joint are written by hand. A file of this folder says how tables are filled and what is made of them.
 
 use crate::error::Result;
 pub use crate::store::Loose;
