@@ -29,7 +29,7 @@
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
 //! | [`diff`] | two tables or two runs compared | raw, store |
-//! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
+//! | [`table`] | Rust values <-> checked columns; rows are made of the schema files | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
@@ -79,7 +79,7 @@
 //! | kind of raw file | `src/stage/ingest/<name>.rs`, which hands out records | its `mod`, and one line in `FORMATS` of `src/stage/ingest/reading.rs` |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
-//! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
+//! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!

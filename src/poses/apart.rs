@@ -6,7 +6,7 @@ use super::site::site;
 use super::{PoseRequest, wish};
 use crate::audit::{POSITIONS, diagnosis};
 use crate::description::RobotDescription;
-use crate::diagnose::{DiagnosedModel, contest};
+use crate::diagnose::{DiagnosedModel, discrimination_problem};
 use crate::effect::{CAUSES, Form, JointTable, Load, Place, cause};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
@@ -89,8 +89,8 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
         return Err(Error::spec("--separate", message));
     }
     let mut tried = None;
-    let told = match contest(&diagnosed, &forms, (&rival.0, rival.1)) {
-        Ok((contest, form)) => {
+    let told = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
+        Ok((problem, form)) => {
             rival = (form.name().to_string(), form.place());
             // A free curve is known where points were fitted, and nowhere else.
             if forms.iter().chain([&form]).any(|form| form.is(&JointTable) || form.cause().is_nameless()) {
@@ -98,7 +98,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
             }
             tried = Some(form);
             let wish = wish(request, Aim::Information, sigma);
-            tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
+            tell(&problem, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
         }
         // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
         Err(_) if listed => Discrimination { before: [0.0; 2], alike: [true; 2], proposed: None },

@@ -108,7 +108,7 @@ fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
     };
     let setting = setting();
     let (mut kept, mut left) = (Vec::new(), Vec::new());
-    for effect in identified().filter_map(|cause| cause.whole(&setting)) {
+    for effect in identified().filter_map(|cause| cause.arm_effect(&setting)) {
         if chosen.is_empty() || chosen.iter().any(|name| name == effect.name()) {
             match effect.missing(robot, &data) {
                 Some(reason) => left.push((effect.name(), reason)),

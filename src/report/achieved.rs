@@ -4,7 +4,7 @@ use super::distribution::{StepErrors, histogram};
 use super::number::{count, fixed};
 use super::page::render;
 use crate::error::Result;
-use serde::Serialize;
+use serde_json::json;
 
 /// What the page shows; lengths in mm.
 pub struct AchievedTables<'a> {
@@ -20,20 +20,6 @@ pub struct AchievedTables<'a> {
     pub poses: Vec<(usize, f64, f64)>,
     /// What to know of the figures, a sentence each.
     pub remarks: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct AchievedPage<'a> {
-    title: &'a str,
-    policy: &'static str,
-    style: &'static str,
-    version: &'static str,
-    model: &'a str,
-    points: String,
-    rows: Vec<[String; 4]>,
-    remarks: &'a [String],
-    picture: String,
-    poses: Vec<[String; 4]>,
 }
 
 /// The page as one file that needs no other.
@@ -53,17 +39,17 @@ pub fn achieved_page(tables: &AchievedTables) -> Result<String> {
     let poses = (1..).zip(&tables.poses).map(|(k, (cycles, accuracy, repeatability)): (i64, _)| {
         [k.to_string(), count(*cycles as i64), mm(*accuracy), mm(*repeatability)]
     });
-    let page = AchievedPage {
-        title: tables.title,
-        policy: "",
-        style: include_str!("report.css"),
-        version: env!("CARGO_PKG_VERSION"),
-        model: tables.model,
-        points: count(tables.errors[1].len() as i64),
-        rows: tables.rows.iter().map(row).collect(),
-        remarks: &tables.remarks,
-        picture: histogram(&errors, "Histogram of the position error before and after correction"),
-        poses: poses.collect(),
-    };
+    let page = json!({
+        "title": tables.title,
+        "policy": "",
+        "style": include_str!("report.css"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "model": tables.model,
+        "points": count(tables.errors[1].len() as i64),
+        "rows": tables.rows.iter().map(row).collect::<Vec<_>>(),
+        "remarks": &tables.remarks,
+        "picture": histogram(&errors, "Histogram of the position error before and after correction"),
+        "poses": poses.collect::<Vec<_>>(),
+    });
     render("achieved.html", include_str!("achieved.html"), &page)
 }

@@ -5,61 +5,48 @@ use super::errors::before;
 use super::findings::wrong_setup;
 use super::limits::{Judgement, judged};
 use super::number::{count, fixed, mm};
-use crate::table::{StatisticsRow, VerdictRow};
+use crate::table::{AcceptanceRow, StatisticsRow, VerdictRow, VerdictTopic};
 use crate::units::Unit;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Standard deviations of an expanded uncertainty (VIM: coverage factor).
 const COVERAGE: f64 = 2.0;
 
-#[derive(Serialize)]
-pub(super) struct Certificate {
-    /// `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
-    kind: &'static str,
-    verdict: String,
-    /// What was calibrated, by whom, with what: name and value.
-    subject: Vec<(String, String)>,
-    /// Model, points, mean, 95 %, largest.
-    figures: Vec<[String; 5]>,
-    /// Figures that stand beside the table.
-    uncertainty: Vec<(&'static str, String)>,
-    /// Figure, found, allowed, whether it is kept.
-    limits: Vec<(&'static str, String, String, bool)>,
-    conditions: Vec<(&'static str, String)>,
-    not_observable: Vec<String>,
-}
-
-impl Certificate {
-    pub fn new(
-        tables: &Tables,
-        robot: &str,
-        identity: &BTreeMap<String, String>,
-        judgement: Option<&Judgement>,
-        set: Option<&str>,
-    ) -> Self {
-        let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
-        let first = after.and_then(|after| before(&tables.statistics.0, after));
-        let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
-        let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
-        let subject = [("robot".to_string(), robot.to_string())];
-        let given = identity.iter().map(|(name, value)| (name.clone(), value.clone()));
-        Self {
-            kind,
-            verdict,
-            subject: subject.into_iter().chain(given).chain(files(tables)).collect(),
-            figures: first
-                .map(|row| ("before", row))
-                .into_iter()
-                .chain(after.map(|row| ("after", row)))
-                .flat_map(figures)
-                .collect(),
-            uncertainty: after.map(uncertainty).unwrap_or_default(),
-            limits: judgement.map(|judgement| judgement.lines.clone()).unwrap_or_default(),
-            conditions: conditions(tables),
-            not_observable: diagnosis.map(|row| row.not_observable.lines().map(str::to_owned).collect()).unwrap_or_default(),
-        }
-    }
+pub(super) fn certificate(
+    tables: &Tables,
+    robot: &str,
+    identity: &BTreeMap<String, String>,
+    judgement: Option<&Judgement>,
+    set: Option<&str>,
+) -> Value {
+    let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
+    let first = after.and_then(|after| before(&tables.statistics.0, after));
+    let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
+    let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
+    let subject = [("robot".to_string(), robot.to_string())];
+    let limit = |(row, found): (&AcceptanceRow, f64)| json!([row.figure, mm(found), mm(row.limit_mm), row.kept]);
+    let given = identity.iter().map(|(name, value)| (name.clone(), value.clone()));
+    json!({
+        // `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
+        "kind": kind,
+        "verdict": verdict,
+        // What was calibrated, by whom, with what: name and value.
+        "subject": subject.into_iter().chain(given).chain(files(tables)).collect::<Vec<_>>(),
+        // Model, points, mean, 95 %, largest.
+        "figures": first
+            .map(|row| ("before", row))
+            .into_iter()
+            .chain(after.map(|row| ("after", row)))
+            .flat_map(figures)
+            .collect::<Vec<_>>(),
+        // Figures that stand beside the table.
+        "uncertainty": after.map(uncertainty).unwrap_or_default(),
+        // Figure, found, allowed, whether it is kept.
+        "limits": judgement.map(|judgement| judgement.found().map(limit).collect::<Vec<_>>()),
+        "conditions": conditions(tables),
+        "not_observable": diagnosis.map(|row| tables.said(&row.step, VerdictTopic::NotObservable)).unwrap_or_default(),
+    })
 }
 
 /// Colour and sentence. Green is what is within the limits and explained; nothing else.

@@ -5,19 +5,8 @@ use super::axis::{Area, Scale, baseline, name_x};
 use super::number::mm;
 use super::svg::Svg;
 use crate::table::{Prediction, PredictionRow};
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
-
-#[derive(Serialize)]
-pub(super) struct ClosureSection {
-    before: String,
-    after: String,
-    picture: String,
-    /// Name, rows, mean and largest before, mean and largest after, mm.
-    rows: Vec<[String; 6]>,
-    /// Fixtures beyond those of the picture.
-    more: usize,
-}
 
 /// What one fixture has, mm.
 struct FixtureFigures {
@@ -34,24 +23,24 @@ const ROW: f64 = 20.0;
 /// Fixtures in the picture; the table has all.
 const MOST: usize = 40;
 
-impl ClosureSection {
-    /// Nothing where no row was brought to a place, or nothing was predicted.
-    pub fn new(tables: &Tables) -> Option<Self> {
-        let all = closings(tables)?;
-        let name = |table: Option<&Prediction>| table.and_then(|table| table.0.first()).map(|row| row.step.clone());
-        let rows = all.iter().map(|own| {
-            let [before, after] = [own.before, own.after].map(|pair| pair.map(mm));
-            let [[a, b], [c, d]] = [before, after];
-            [own.name.clone(), own.count.to_string(), a, b, c, d]
-        });
-        Some(Self {
-            before: name(tables.prediction.first())?,
-            after: name(standing(tables))?,
-            picture: picture(&all[..all.len().min(MOST)]),
-            rows: rows.collect(),
-            more: all.len().saturating_sub(MOST),
-        })
-    }
+/// Nothing where no row was brought to a place, or nothing was predicted.
+pub(super) fn section(tables: &Tables) -> Option<Value> {
+    let all = closings(tables)?;
+    let name = |table: Option<&Prediction>| table.and_then(|table| table.0.first()).map(|row| row.step.clone());
+    let rows = all.iter().map(|own| {
+        let [before, after] = [own.before, own.after].map(|pair| pair.map(mm));
+        let [[a, b], [c, d]] = [before, after];
+        [own.name.clone(), own.count.to_string(), a, b, c, d]
+    });
+    Some(json!({
+        "before": name(tables.prediction.first())?,
+        "after": name(standing(tables))?,
+        "picture": picture(&all[..all.len().min(MOST)]),
+        // Name, rows, mean and largest before, mean and largest after, mm.
+        "rows": rows.collect::<Vec<_>>(),
+        // Fixtures beyond those of the picture.
+        "more": all.len().saturating_sub(MOST),
+    }))
 }
 
 fn standing(tables: &Tables) -> Option<&Prediction> {

@@ -3,34 +3,14 @@
 use super::Tables;
 use super::number::{count, mm, signed};
 use crate::table::CorrectionsRow;
-use serde::Serialize;
-
-/// The comparison of one stage.
-#[derive(Serialize)]
-pub(super) struct ComparisonView {
-    step: String,
-    sentence: String,
-    rows: Vec<RivalView>,
-}
-
-#[derive(Serialize)]
-struct RivalView {
-    name: String,
-    chosen: bool,
-    /// Mean, rms, largest error, mm.
-    errors: [String; 3],
-    gain: String,
-    numbers: String,
-    settings: String,
-    reason: String,
-}
+use serde_json::{Value, json};
 
 /// The comparisons in pipeline order; stages that had too few rows compared nothing.
-pub(super) fn comparisons(tables: &Tables) -> Vec<ComparisonView> {
+pub(super) fn comparisons(tables: &Tables) -> Vec<Value> {
     tables.corrections.iter().filter_map(|table| comparison(&table.0)).collect()
 }
 
-fn comparison(rows: &[CorrectionsRow]) -> Option<ComparisonView> {
+fn comparison(rows: &[CorrectionsRow]) -> Option<Value> {
     let first = rows.first()?;
     let chosen = rows.iter().find(|row| row.chosen).unwrap_or(first);
     let error = |value: Option<f64>| value.map_or_else(String::new, mm);
@@ -40,23 +20,26 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<ComparisonView> {
         let (before, after) = (mm(chosen.before_mm), error(chosen.mean_mm));
         format!("kept is {}; the mean error falls from {before} to {after} mm on rows that it did not see.", words(&chosen.rival))
     };
-    let view = |row: &CorrectionsRow| RivalView {
-        name: words(&row.rival),
-        chosen: row.chosen,
-        errors: [row.mean_mm, row.rms_mm, row.max_mm].map(error),
-        gain: row
-            .gain_mm
-            .zip(row.gain_sigma_mm)
-            .filter(|_| row.rival != "none")
-            .map_or_else(String::new, |(gain, sigma)| format!("{} \u{b1} {}", signed(gain, 3), mm(sigma))),
-        numbers: if row.numbers > 0 { count(row.numbers) } else { String::new() },
-        settings: row
-            .hidden
-            .zip(row.decay)
-            .map_or_else(String::new, |(hidden, decay)| format!("{hidden} neurons, decay {decay}")),
-        reason: row.reason.clone(),
+    let view = |row: &CorrectionsRow| {
+        json!({
+            "name": words(&row.rival),
+            "chosen": row.chosen,
+            // Mean, rms, largest error, mm.
+            "errors": Vec::from([row.mean_mm, row.rms_mm, row.max_mm].map(error)),
+            "gain": row
+                .gain_mm
+                .zip(row.gain_sigma_mm)
+                .filter(|_| row.rival != "none")
+                .map_or_else(String::new, |(gain, sigma)| format!("{} \u{b1} {}", signed(gain, 3), mm(sigma))),
+            "numbers": if row.numbers > 0 { count(row.numbers) } else { String::new() },
+            "settings": row
+                .hidden
+                .zip(row.decay)
+                .map_or_else(String::new, |(hidden, decay)| format!("{hidden} neurons, decay {decay}")),
+            "reason": row.reason,
+        })
     };
-    Some(ComparisonView { step: first.step.clone(), sentence, rows: rows.iter().map(view).collect() })
+    Some(json!({ "step": first.step, "sentence": sentence, "rows": rows.iter().map(view).collect::<Vec<_>>() }))
 }
 
 /// A rival's name in words; names that are not known stay.

@@ -4,57 +4,11 @@ use super::Tables;
 use super::number::{count, fixed};
 use crate::table::{IntakeRow, RejectedRow, Robot};
 use crate::units::Unit;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Rejected rows that are listed; the table holds all.
 const LISTED: usize = 50;
-
-#[derive(Serialize)]
-pub(super) struct DataSection {
-    joints: Vec<Joint>,
-    tool: Option<String>,
-    points: String,
-    quantities: Vec<&'static str>,
-    /// Set and its rows.
-    sets: Vec<(String, String)>,
-    files: Vec<File>,
-    reasons: Vec<String>,
-    rejected: Vec<Reject>,
-    rejected_count: String,
-    unlisted: bool,
-    /// Table kind and its rows, as read by the report; a sum where several stages wrote one.
-    tables: Vec<(&'static str, String)>,
-}
-
-#[derive(Serialize)]
-struct Joint {
-    name: String,
-    kind: String,
-    axis: String,
-    point: String,
-    limits: String,
-}
-
-#[derive(Serialize)]
-struct File {
-    name: String,
-    lines: String,
-    read: String,
-    accepted: String,
-    rejected: String,
-    balanced: bool,
-}
-
-#[derive(Serialize)]
-struct Reject {
-    file: String,
-    line: String,
-    point: String,
-    reason: String,
-    detail: String,
-    text: String,
-}
 
 /// The base's name is the robot's.
 pub(super) fn robot_name(robot: &Robot) -> String {
@@ -62,60 +16,62 @@ pub(super) fn robot_name(robot: &Robot) -> String {
     base.map(|body| body.name.trim()).filter(|name| !name.is_empty()).unwrap_or("a robot without a name").to_owned()
 }
 
-impl DataSection {
-    pub fn new(tables: &Tables) -> Self {
-        let recording = &tables.recording;
-        let quantities = [
-            (recording.position_sigma.is_some(), "measurement sigma"),
-            (recording.time.is_some(), "time"),
-            (recording.payload.is_some(), "payload"),
-            (recording.temperature.is_some(), "temperature"),
-            (recording.current.is_some(), "motor current"),
-            (recording.direction.is_some(), "direction of approach"),
-            (recording.velocity.is_some(), "joint velocities"),
-        ];
-        let mut sets: BTreeMap<&str, i64> = BTreeMap::new();
-        for row in &tables.split.0 {
-            *sets.entry(&row.set).or_default() += 1;
-        }
-        let rejected: Vec<&RejectedRow> = tables.rejected.iter().flat_map(|table| &table.0).collect();
-        let reasons: BTreeSet<&String> = rejected.iter().map(|row| &row.reason).collect();
-        Self {
-            joints: joints(&tables.robot),
-            tool: tool(&tables.robot),
-            points: count(recording.rows() as i64),
-            quantities: quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect(),
-            sets: sets.into_iter().map(|(name, rows)| (name.into(), count(rows))).collect(),
-            files: tables.intake.iter().flat_map(|table| &table.0).map(file).collect(),
-            reasons: reasons.into_iter().cloned().collect(),
-            rejected: rejected.iter().take(LISTED).map(|row| reject(row)).collect(),
-            rejected_count: count(rejected.len() as i64),
-            unlisted: rejected.len() > LISTED,
-            tables: kinds(tables),
-        }
+pub(super) fn section(tables: &Tables) -> Value {
+    let recording = &tables.recording;
+    let quantities = [
+        (recording.position_sigma.is_some(), "measurement sigma"),
+        (recording.time.is_some(), "time"),
+        (recording.payload.is_some(), "payload"),
+        (recording.temperature.is_some(), "temperature"),
+        (recording.current.is_some(), "motor current"),
+        (recording.direction.is_some(), "direction of approach"),
+        (recording.velocity.is_some(), "joint velocities"),
+    ];
+    let mut sets: BTreeMap<&str, i64> = BTreeMap::new();
+    for row in &tables.split.0 {
+        *sets.entry(&row.set).or_default() += 1;
     }
+    let rejected: Vec<&RejectedRow> = tables.rejected.iter().flat_map(|table| &table.0).collect();
+    let reasons: BTreeSet<&String> = rejected.iter().map(|row| &row.reason).collect();
+    json!({
+        "joints": joints(&tables.robot),
+        "tool": tool(&tables.robot),
+        "points": count(recording.rows() as i64),
+        "quantities": quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect::<Vec<_>>(),
+        // Set and its rows.
+        "sets": sets.into_iter().map(|(name, rows)| (name, count(rows))).collect::<Vec<_>>(),
+        "files": tables.intake.iter().flat_map(|table| &table.0).map(file).collect::<Vec<_>>(),
+        "reasons": reasons.into_iter().cloned().collect::<Vec<_>>(),
+        "rejected": rejected.iter().take(LISTED).map(|row| reject(row)).collect::<Vec<_>>(),
+        "rejected_count": count(rejected.len() as i64),
+        "unlisted": rejected.len() > LISTED,
+        // Table kind and its rows, as read by the report; a sum where several stages wrote one.
+        "tables": kinds(tables),
+    })
 }
 
-fn joints(robot: &Robot) -> Vec<Joint> {
+fn joints(robot: &Robot) -> Vec<Value> {
     let triple = |values: [Option<f64>; 3], decimals| {
         let texts: Option<Vec<String>> = values.into_iter().map(|v| Some(fixed(v?, decimals))).collect();
         texts.map_or_else(String::new, |texts| texts.join(", "))
     };
     let bodies = robot.0.iter().filter(|body| body.kind == "revolute" || body.kind == "prismatic");
     bodies
-        .map(|body| Joint {
-            name: format!("{} {}", body.body, body.name),
-            kind: body.kind.clone(),
-            axis: triple([body.axis_x, body.axis_y, body.axis_z], 4),
-            point: triple([body.point_x_mm, body.point_y_mm, body.point_z_mm], 1),
-            limits: match (body.lower_rad.zip(body.upper_rad), body.lower_mm.zip(body.upper_mm)) {
-                (Some((lower, upper)), _) => {
-                    let degrees = |v| fixed(Unit::Degree.from_si(v), 1);
-                    format!("{} to {} deg", degrees(lower), degrees(upper))
-                }
-                (None, Some((lower, upper))) => format!("{} to {} mm", fixed(lower, 1), fixed(upper, 1)),
-                (None, None) => String::new(),
-            },
+        .map(|body| {
+            json!({
+                "name": format!("{} {}", body.body, body.name),
+                "kind": body.kind,
+                "axis": triple([body.axis_x, body.axis_y, body.axis_z], 4),
+                "point": triple([body.point_x_mm, body.point_y_mm, body.point_z_mm], 1),
+                "limits": match (body.lower_rad.zip(body.upper_rad), body.lower_mm.zip(body.upper_mm)) {
+                    (Some((lower, upper)), _) => {
+                        let degrees = |v| fixed(Unit::Degree.from_si(v), 1);
+                        format!("{} to {} deg", degrees(lower), degrees(upper))
+                    }
+                    (None, Some((lower, upper))) => format!("{} to {} mm", fixed(lower, 1), fixed(upper, 1)),
+                    (None, None) => String::new(),
+                },
+            })
         })
         .collect()
 }
@@ -127,26 +83,26 @@ fn tool(robot: &Robot) -> Option<String> {
     Some(format!("{point} mm{mass}"))
 }
 
-fn file(row: &IntakeRow) -> File {
-    File {
-        name: row.file.clone(),
-        lines: count(row.lines),
-        read: count(row.read),
-        accepted: count(row.accepted),
-        rejected: count(row.rejected),
-        balanced: row.accepted + row.rejected == row.read,
-    }
+fn file(row: &IntakeRow) -> Value {
+    json!({
+        "name": row.file,
+        "lines": count(row.lines),
+        "read": count(row.read),
+        "accepted": count(row.accepted),
+        "rejected": count(row.rejected),
+        "balanced": row.accepted + row.rejected == row.read,
+    })
 }
 
-fn reject(row: &RejectedRow) -> Reject {
-    Reject {
-        file: row.file.clone(),
-        line: row.line.to_string(),
-        point: row.point_id.clone().unwrap_or_default(),
-        reason: row.reason.clone(),
-        detail: row.detail.clone(),
-        text: row.text.clone(),
-    }
+fn reject(row: &RejectedRow) -> Value {
+    json!({
+        "file": row.file,
+        "line": row.line.to_string(),
+        "point": row.point_id.clone().unwrap_or_default(),
+        "reason": row.reason,
+        "detail": row.detail,
+        "text": row.text,
+    })
 }
 
 fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {

@@ -7,7 +7,7 @@ use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
 use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The steps in pipeline order, each with the colour it has in all pictures.
@@ -50,75 +50,6 @@ impl Steps {
     }
 }
 
-#[derive(Serialize)]
-pub(super) struct ErrorsSection {
-    verdict: VerdictView,
-    /// Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
-    held_out: Vec<Block>,
-    training: Vec<Block>,
-    folds: Vec<Fold>,
-    /// What the second kind of folds is.
-    blocks: &'static str,
-    /// Steps whose cross-validation was dropped, and the number of poses.
-    unfolded: Vec<(String, String)>,
-    references: Vec<ReferenceView>,
-    pictures: Vec<Picture>,
-    legend: Vec<(String, String)>,
-}
-
-#[derive(Serialize)]
-struct VerdictView {
-    sentence: String,
-    others: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Block {
-    set: String,
-    note: Option<&'static str>,
-    rows: Vec<ErrorsRow>,
-}
-
-#[derive(Serialize)]
-struct ErrorsRow {
-    step: String,
-    colour: String,
-    points: String,
-    /// Of the step that stands.
-    last: bool,
-    /// mean, std, p95, max, rms, median, rms x, y, z, noise.
-    values: Vec<String>,
-}
-
-/// Training points of one step and set, each under a fit without it.
-#[derive(Serialize)]
-struct Fold {
-    step: String,
-    colour: String,
-    set: String,
-    /// Parts drawn at random: mean, max, rms, expected rms; contiguous parts: mean, max, rms.
-    values: [String; 7],
-}
-
-/// Our figures of one step and set beside those that the pipeline names.
-#[derive(Serialize)]
-struct ReferenceView {
-    label: String,
-    step: String,
-    set: String,
-    points: &'static str,
-    /// Ours and theirs: mean, std, max.
-    figures: [(String, String); 3],
-}
-
-#[derive(Serialize)]
-struct Picture {
-    set: String,
-    points: String,
-    histogram: String,
-    cumulative: String,
-}
-
 /// What is left out together, beside parts drawn at random.
 fn blocks(rows: &[StatisticsRow]) -> &'static str {
     let folded = || rows.iter().filter(|row| row.fold_rms_mm.is_some());
@@ -129,44 +60,47 @@ fn blocks(rows: &[StatisticsRow]) -> &'static str {
     }
 }
 
-impl ErrorsSection {
-    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
-        let rows = &tables.statistics.0;
-        let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
-        if let Some(wished) = wished
-            && !last.iter().any(|row| row.set == wished)
-        {
-            let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
-            return Err(Error::spec(
-                "with.set",
-                format!("`{wished}` is not a held-out set of the step that the run uses; allowed: {}", allowed.join(", ")),
-            ));
-        }
-        last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));
-        let kept: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
-        let later = sets(rows, true).into_iter().filter(|set| !kept.contains(set));
-        let block = |set: &str, held_out: bool, note| Block {
-            set: set.into(),
-            note,
-            rows: rows.iter().filter(|r| r.set == set && r.held_out == held_out).map(|r| row(r, steps)).collect(),
-        };
-        let held_out = kept.iter().map(|set| block(set, true, None));
-        let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
-        Ok(Self {
-            verdict: match wrong_setup(tables) {
-                Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
-                None => verdict(rows, &last, &tables.withdrawn),
-            },
-            held_out: held_out.chain(used).collect(),
-            training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
-            folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
-            blocks: blocks(rows),
-            unfolded: unfolded(tables),
-            references: rows.iter().filter_map(beside).collect(),
-            pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
-            legend: steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect(),
-        })
+pub(super) fn errors_section(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Value> {
+    let rows = &tables.statistics.0;
+    let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
+    if let Some(wished) = wished
+        && !last.iter().any(|row| row.set == wished)
+    {
+        let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
+        return Err(Error::spec(
+            "with.set",
+            format!("`{wished}` is not a held-out set of the step that the run uses; allowed: {}", allowed.join(", ")),
+        ));
     }
+    last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));
+    let kept: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
+    let later = sets(rows, true).into_iter().filter(|set| !kept.contains(set));
+    let block = |set: &str, held_out: bool, note| {
+        json!({
+            "set": set,
+            "note": note,
+            "rows": rows.iter().filter(|r| r.set == set && r.held_out == held_out).map(|r| row(r, steps)).collect::<Vec<_>>(),
+        })
+    };
+    let held_out = kept.iter().map(|set| block(set, true, None));
+    let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
+    Ok(json!({
+        "verdict": match wrong_setup(tables) {
+            Some(_) => nothing_known("Nothing is calibrated before the set-up is right.".into()),
+            None => verdict(rows, &last, &tables.withdrawn),
+        },
+        // Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
+        "held_out": held_out.chain(used).collect::<Vec<_>>(),
+        "training": sets(rows, false).into_iter().map(|set| block(set, false, None)).collect::<Vec<_>>(),
+        "folds": rows.iter().filter_map(|row| fold(row, steps)).collect::<Vec<_>>(),
+        // What the second kind of folds is.
+        "blocks": blocks(rows),
+        // Steps whose cross-validation was dropped, and the number of poses.
+        "unfolded": unfolded(tables),
+        "references": rows.iter().filter_map(beside).collect::<Vec<_>>(),
+        "pictures": last.iter().map(|row| picture(tables, row, steps)).collect::<Vec<_>>(),
+        "legend": steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect::<Vec<_>>(),
+    }))
 }
 
 fn unfolded(tables: &Tables) -> Vec<(String, String)> {
@@ -185,7 +119,7 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
     names
 }
 
-fn row(row: &StatisticsRow, steps: &Steps) -> ErrorsRow {
+fn row(row: &StatisticsRow, steps: &Steps) -> Value {
     let values = [
         row.mean_mm,
         row.std_mm,
@@ -198,16 +132,18 @@ fn row(row: &StatisticsRow, steps: &Steps) -> ErrorsRow {
         row.rms_z_mm,
         row.noise_rms_mm,
     ];
-    ErrorsRow {
-        step: steps.called(&row.step),
-        colour: steps.colour(row.order),
-        points: count(row.points),
-        last: Some(row.order) == steps.standing(),
-        values: values.into_iter().map(mm).collect(),
-    }
+    json!({
+        "step": steps.called(&row.step),
+        "colour": steps.colour(row.order),
+        "points": count(row.points),
+        // Of the step that stands.
+        "last": Some(row.order) == steps.standing(),
+        // mean, std, p95, max, rms, median, rms x, y, z, noise.
+        "values": values.into_iter().map(mm).collect::<Vec<_>>(),
+    })
 }
 
-fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Fold> {
+fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Value> {
     row.fold_rms_mm?;
     let values = [
         row.fold_mean_mm,
@@ -218,27 +154,29 @@ fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Fold> {
         row.block_max_mm,
         row.block_rms_mm,
     ];
-    Some(Fold {
-        step: steps.called(&row.step),
-        colour: steps.colour(row.order),
-        set: row.set.clone(),
-        values: values.map(|value| value.map_or_else(String::new, mm)),
-    })
+    Some(json!({
+        "step": steps.called(&row.step),
+        "colour": steps.colour(row.order),
+        "set": row.set,
+        // Parts drawn at random: mean, max, rms, expected rms; contiguous parts: mean, max, rms.
+        "values": values.map(|value| value.map_or_else(String::new, mm)),
+    }))
 }
 
-fn beside(row: &StatisticsRow) -> Option<ReferenceView> {
+fn beside(row: &StatisticsRow) -> Option<Value> {
     let figure = |ours, theirs: Option<f64>| (mm(ours), theirs.map_or_else(String::new, mm));
-    Some(ReferenceView {
-        label: row.reference.clone()?,
-        step: row.step.clone(),
-        set: row.set.clone(),
-        points: if row.held_out { "held out" } else { "training" },
-        figures: [
+    Some(json!({
+        "label": row.reference.clone()?,
+        "step": row.step,
+        "set": row.set,
+        "points": if row.held_out { "held out" } else { "training" },
+        // Ours and theirs: mean, std, max.
+        "figures": [
             figure(row.mean_mm, row.reference_mean_mm),
             figure(row.std_mm, row.reference_std_mm),
             figure(row.max_mm, row.reference_max_mm),
         ],
-    })
+    }))
 }
 
 /// The first step with held-out rows of the same set as `after`.
@@ -251,11 +189,11 @@ fn points(number: i64) -> String {
 }
 
 /// A sentence without figures.
-fn nothing_known(sentence: String) -> VerdictView {
-    VerdictView { sentence, others: Vec::new() }
+fn nothing_known(sentence: String) -> Value {
+    json!({ "sentence": sentence, "others": [] })
 }
 
-fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> VerdictView {
+fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> Value {
     let Some(after) = last.first() else {
         let sentence = "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
                         the model was fitted to, and flatter it.";
@@ -281,17 +219,17 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
         format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
     };
-    VerdictView {
-        sentence,
-        others: (withdrawn.iter().map(|gone| format!("{gone}.")))
+    json!({
+        "sentence": sentence,
+        "others": (withdrawn.iter().map(|gone| format!("{gone}.")))
             .chain(uneven)
             .chain(after.doubts().map(|line| format!("{line}.")))
             .chain(last.iter().skip(1).map(other))
-            .collect(),
-    }
+            .collect::<Vec<_>>(),
+    })
 }
 
-fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
+fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Value {
     let rows = tables.statistics.0.iter().filter(|row| row.held_out && row.set == set.set);
     let errors: Vec<distribution::StepErrors> = rows
         .map(|row| {
@@ -303,45 +241,29 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
         })
         .filter(|errors| !errors.sorted_mm.is_empty())
         .collect();
-    Picture {
-        set: set.set.clone(),
-        points: count(set.points),
-        histogram: histogram(&errors, &format!("Histogram of the position error after each step, set {}", set.set)),
-        cumulative: cumulative(&errors, &format!("Cumulative position error after each step, set {}", set.set)),
-    }
+    json!({
+        "set": set.set,
+        "points": count(set.points),
+        "histogram": histogram(&errors, &format!("Histogram of the position error after each step, set {}", set.set)),
+        "cumulative": cumulative(&errors, &format!("Cumulative position error after each step, set {}", set.set)),
+    })
 }
 
-/// The error over the workspace after the first step and after the one that stands.
-#[derive(Serialize)]
-pub(super) struct WorkspaceSection {
-    legend: Vec<(String, String)>,
-    panels: Vec<Panel>,
-}
-
-#[derive(Serialize)]
-struct Panel {
-    name: String,
-    remark: String,
-    svg: String,
-}
-
-impl WorkspaceSection {
-    /// Nothing where nothing was predicted.
-    pub fn new(prediction: &[Prediction], standing: Option<&str>) -> Option<Self> {
-        let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
-        let first = filled.next()?;
-        let is = |table: &&Prediction| table.0.first().is_some_and(|row| Some(row.step.as_str()) == standing);
-        let last = filled.clone().rfind(is).or_else(|| filled.next_back());
-        let colours = Colours::new(first, last.unwrap_or(first));
-        let mut panels = Vec::new();
-        for view in VIEWS {
-            for table in std::iter::once(first).chain(last) {
-                let step = table.0.first().map_or("", |row| &row.step);
-                let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
-                let (svg, remark) = scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
-                panels.push(Panel { name, remark, svg });
-            }
+/// Nothing where nothing was predicted.
+pub(super) fn workspace_section(prediction: &[Prediction], standing: Option<&str>) -> Option<Value> {
+    let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
+    let first = filled.next()?;
+    let is = |table: &&Prediction| table.0.first().is_some_and(|row| Some(row.step.as_str()) == standing);
+    let last = filled.clone().rfind(is).or_else(|| filled.next_back());
+    let colours = Colours::new(first, last.unwrap_or(first));
+    let mut panels = Vec::new();
+    for view in VIEWS {
+        for table in std::iter::once(first).chain(last) {
+            let step = table.0.first().map_or("", |row| &row.step);
+            let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
+            let (svg, remark) = scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
+            panels.push(json!({ "name": name, "remark": remark, "svg": svg }));
         }
-        Some(Self { legend: colours.legend(), panels })
     }
+    Some(json!({ "legend": colours.legend(), "panels": panels }))
 }

@@ -4,9 +4,10 @@ use super::Tables;
 use super::axis::{Area, Scale, baseline, label, name_x, name_y};
 use super::number::{count, mm, significant};
 use super::svg::Svg;
-use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, formula_in_words};
+use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, VerdictTopic, formula_in_words};
 use crate::units::Unit;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Points drawn in one picture: more would hide each other.
 const DRAWN: usize = 700;
@@ -22,26 +23,6 @@ const EVIDENCE: [(&str, &str); 8] = [
     ("cross-validated gain", "cross-validated rms without the finding minus that with it"),
     ("size", "rms of the whole effect at the tool"),
 ];
-
-#[derive(Serialize)]
-pub(super) struct FindingsSection {
-    kind: &'static str,
-    sentence: String,
-    heading: &'static str,
-    /// What the errors are of.
-    caption: &'static str,
-    /// Name, mean, rms, max.
-    errors: Vec<[String; 4]>,
-    facts: Vec<(&'static str, String)>,
-    findings: Vec<FindingView>,
-    /// What each figure of the evidence means.
-    meanings: Vec<(&'static str, &'static str)>,
-    next: Vec<String>,
-    signature: Option<String>,
-    /// Findings that were taken back.
-    withdrawn: Vec<String>,
-    suspects: Vec<[String; 5]>,
-}
 
 #[derive(Serialize)]
 struct FindingView {
@@ -60,46 +41,46 @@ struct FindingView {
     pictures: Vec<(String, String)>,
 }
 
-impl FindingsSection {
-    /// None where the pipeline made no diagnosis.
-    pub fn new(tables: &Tables) -> Option<Self> {
-        let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
-        let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
-        let figure = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), mm);
-        let errors = |name: &str, mean, rms, max| [name.to_string(), figure(mean), figure(rms), figure(max)];
-        let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
-        let wrong = wrong_setup(tables).is_some();
-        let (before, after) = match wrong {
-            true => ("before: as set up", "after: set-up corrected"),
-            false => ("before: geometry, zeros and ratios identified", "after: with the findings"),
-        };
-        let findings: Vec<FindingView> =
-            tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect();
-        let shown = |name: &str| findings.iter().flat_map(|finding| &finding.evidence).any(|(shown, _)| *shown == name);
-        let meanings = EVIDENCE.into_iter().filter(|(name, _)| shown(name)).collect();
-        Some(Self {
-            kind: match verdict.verdict.as_str() {
-                "explained" | "nothing_missing" => "better",
-                _ => "unknown",
-            },
-            sentence: sentence(verdict, tables),
-            heading: if wrong { "The set-up is wrong" } else { "What the simulation lacked" },
-            caption: if wrong { "Error of the nominal robot, base and tool fitted, mm" } else { "Error of held-out points, mm" },
-            errors: vec![
-                errors(before, verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
-                errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
-            ],
-            facts: facts(verdict),
-            findings,
-            meanings,
-            next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
-            signature: verdict.signature.clone(),
-            withdrawn: verdict.withdrawn.as_deref().map(lines).unwrap_or_default(),
-            suspects: suspects
-                .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
-                .collect(),
-        })
-    }
+/// None where the pipeline made no diagnosis.
+pub(super) fn section(tables: &Tables) -> Option<Value> {
+    let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
+    let figure = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), mm);
+    let errors = |name: &str, mean, rms, max| [name.to_string(), figure(mean), figure(rms), figure(max)];
+    let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
+    let wrong = wrong_setup(tables).is_some();
+    let (before, after) = match wrong {
+        true => ("before: as set up", "after: set-up corrected"),
+        false => ("before: geometry, zeros and ratios identified", "after: with the findings"),
+    };
+    let findings: Vec<FindingView> = tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect();
+    let shown = |name: &str| findings.iter().flat_map(|finding| &finding.evidence).any(|(shown, _)| *shown == name);
+    let meanings: Vec<_> = EVIDENCE.into_iter().filter(|(name, _)| shown(name)).collect();
+    Some(json!({
+        "kind": match verdict.verdict.as_str() {
+            "explained" | "nothing_missing" => "better",
+            _ => "unknown",
+        },
+        "sentence": sentence(verdict, tables),
+        "heading": if wrong { "The set-up is wrong" } else { "What the simulation lacked" },
+        // What the errors are of.
+        "caption": if wrong { "Error of the nominal robot, base and tool fitted, mm" } else { "Error of held-out points, mm" },
+        // Name, mean, rms, max.
+        "errors": vec![
+            errors(before, verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
+            errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
+        ],
+        "facts": facts(verdict),
+        "findings": findings,
+        // What each figure of the evidence means.
+        "meanings": meanings,
+        "next": tables.said(&verdict.step, VerdictTopic::NextMeasurement),
+        "signature": verdict.signature,
+        // Findings that were taken back.
+        "withdrawn": tables.said(&verdict.step, VerdictTopic::Withdrawn),
+        "suspects": suspects
+            .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
+            .collect::<Vec<_>>(),
+    }))
 }
 
 /// What is wrong with the set-up; none where it is right.

@@ -5,73 +5,29 @@ use super::course::{Line, course, spectrum};
 use super::errors::Steps;
 use super::number::{count, mm, significant};
 use crate::table::{FitRow, ObservabilityRow, TrainingRow};
-use serde::Serialize;
+use serde_json::{Value, json};
 
-#[derive(Serialize)]
-pub(super) struct FitsSection {
-    fits: Vec<FitView>,
-    courses: Option<String>,
-    legend: Vec<(String, String)>,
-    seen: Vec<Seen>,
-    trainings: Vec<TrainingView>,
-}
-
-/// The last iteration of a step.
-#[derive(Serialize)]
-struct FitView {
-    step: String,
-    iterations: String,
-    rms: String,
-    cost: String,
-    gradient: String,
-    step_norm: String,
-    stop: String,
-}
-
-#[derive(Serialize)]
-struct Seen {
-    step: String,
-    /// Quantity, value, meaning.
-    quantities: Vec<(String, String, String)>,
-    spectrum: Option<String>,
-    /// What the singular values are of.
-    meaning: String,
-}
-
-#[derive(Serialize)]
-struct TrainingView {
-    step: String,
-    phase: String,
-    last: String,
-    evaluations: String,
-    train: String,
-    check: Option<String>,
-    svg: String,
-}
-
-impl FitsSection {
-    pub fn new(tables: &Tables, steps: &Steps) -> Self {
-        let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| row.step.clone());
-        let lines: Vec<Line> = fits
-            .iter()
-            .map(|(step, rows)| Line {
-                colour: steps.colour_of(step),
-                points: rows.iter().map(|row| [row.iteration as f64, row.rms_mm]).collect(),
-            })
-            .collect();
-        // The networks of an ensemble differ by chance alone: the swarm and the first of them tell how training went.
-        let courses = tables.training.iter().flat_map(|t| &t.0).filter(|row| row.member <= 1);
-        let trainings = groups(courses, |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
-        let seen = groups(tables.observability.iter().flat_map(|t| &t.0), |row: &ObservabilityRow| row.step.clone());
-        Self {
-            courses: (!lines.is_empty())
-                .then(|| course(&lines, "iteration", "rms over the rows of the fit, mm", "Convergence of the fits")),
-            legend: fits.iter().map(|(step, _)| (steps.colour_of(step), step.clone())).collect(),
-            fits: fits.iter().filter_map(|(step, rows)| Some(fit(step, rows.last()?))).collect(),
-            seen: seen.into_iter().map(|(step, rows)| see(step, &rows)).collect(),
-            trainings: trainings.into_iter().filter_map(|((step, phase), rows)| training(step, phase, &rows)).collect(),
-        }
-    }
+pub(super) fn section(tables: &Tables, steps: &Steps) -> Value {
+    let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| row.step.clone());
+    let lines: Vec<Line> = fits
+        .iter()
+        .map(|(step, rows)| Line {
+            colour: steps.colour_of(step),
+            points: rows.iter().map(|row| [row.iteration as f64, row.rms_mm]).collect(),
+        })
+        .collect();
+    // The networks of an ensemble differ by chance alone: the swarm and the first of them tell how training went.
+    let courses = tables.training.iter().flat_map(|t| &t.0).filter(|row| row.member <= 1);
+    let trainings = groups(courses, |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
+    let seen = groups(tables.observability.iter().flat_map(|t| &t.0), |row: &ObservabilityRow| row.step.clone());
+    json!({
+        "courses": (!lines.is_empty())
+            .then(|| course(&lines, "iteration", "rms over the rows of the fit, mm", "Convergence of the fits")),
+        "legend": fits.iter().map(|(step, _)| (steps.colour_of(step), step.clone())).collect::<Vec<_>>(),
+        "fits": fits.iter().filter_map(|(step, rows)| Some(fit(step, rows.last()?))).collect::<Vec<_>>(),
+        "seen": seen.into_iter().map(|(step, rows)| see(step, &rows)).collect::<Vec<_>>(),
+        "trainings": trainings.into_iter().filter_map(|((step, phase), rows)| training(step, phase, &rows)).collect::<Vec<_>>(),
+    })
 }
 
 /// Rows by a key, in the order in which the keys first come.
@@ -87,39 +43,41 @@ fn groups<'a, R, K: PartialEq>(rows: impl Iterator<Item = &'a R>, key: impl Fn(&
     groups
 }
 
-fn fit(step: &str, last: &FitRow) -> FitView {
-    FitView {
-        step: step.into(),
-        iterations: count(last.iteration),
-        rms: mm(last.rms_mm),
-        cost: significant(last.cost, 6),
-        gradient: significant(last.gradient, 2),
-        step_norm: significant(last.step_norm, 2),
-        stop: last.stop.clone().unwrap_or_else(|| "not stated".into()),
-    }
+fn fit(step: &str, last: &FitRow) -> Value {
+    json!({
+        "step": step,
+        "iterations": count(last.iteration),
+        "rms": mm(last.rms_mm),
+        "cost": significant(last.cost, 6),
+        "gradient": significant(last.gradient, 2),
+        "step_norm": significant(last.step_norm, 2),
+        "stop": last.stop.clone().unwrap_or_else(|| "not stated".into()),
+    })
 }
 
-fn see(step: String, rows: &[&ObservabilityRow]) -> Seen {
+fn see(step: String, rows: &[&ObservabilityRow]) -> Value {
     let values: Vec<(i64, f64)> =
         rows.iter().filter(|row| row.quantity == "singular_value").map(|row| (row.index, row.value)).collect();
     let meaning = rows.iter().find(|row| row.quantity == "singular_value").map_or("", |row| &row.meaning);
     let others = rows.iter().filter(|row| row.quantity != "singular_value");
-    Seen {
-        spectrum: (!values.is_empty()).then(|| spectrum(&values, &format!("Singular values of the step {step}"))),
-        meaning: meaning.into(),
-        quantities: others
+    json!({
+        "spectrum": (!values.is_empty()).then(|| spectrum(&values, &format!("Singular values of the step {step}"))),
+        // What the singular values are of.
+        "meaning": meaning,
+        // Quantity, value, meaning.
+        "quantities": others
             .map(|row| {
                 let whole = row.value.fract() == 0.0 && row.value.abs() < 1e6;
                 let value = if whole { count(row.value as i64) } else { significant(row.value, 4) };
                 let name = if row.index == 0 { row.quantity.clone() } else { format!("{} {}", row.quantity, row.index) };
                 (name, value, row.meaning.clone())
             })
-            .collect(),
-        step,
-    }
+            .collect::<Vec<_>>(),
+        "step": step,
+    })
 }
 
-fn training(step: String, phase: String, rows: &[&TrainingRow]) -> Option<TrainingView> {
+fn training(step: String, phase: String, rows: &[&TrainingRow]) -> Option<Value> {
     let last = rows.last()?;
     let line = |colour: &str, value: fn(&TrainingRow) -> Option<f64>| Line {
         colour: colour.into(),
@@ -129,13 +87,13 @@ fn training(step: String, phase: String, rows: &[&TrainingRow]) -> Option<Traini
         .into_iter()
         .filter(|line| !line.points.is_empty())
         .collect();
-    Some(TrainingView {
-        svg: course(&lines, "generation", "rms of the position error, mm", &format!("Training of {step}, {phase}")),
-        last: count(last.generation),
-        evaluations: count(last.evaluations),
-        train: mm(last.train_rms_mm),
-        check: last.check_rms_mm.map(mm),
-        step,
-        phase,
-    })
+    Some(json!({
+        "svg": course(&lines, "generation", "rms of the position error, mm", &format!("Training of {step}, {phase}")),
+        "last": count(last.generation),
+        "evaluations": count(last.evaluations),
+        "train": mm(last.train_rms_mm),
+        "check": last.check_rms_mm.map(mm),
+        "step": step,
+        "phase": phase,
+    }))
 }

@@ -4,74 +4,8 @@ use super::page::render;
 use super::svg::Svg;
 use crate::error::{Result, visible};
 use crate::table::{FleetChanges, FleetRow, FleetTable};
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
-
-#[derive(Serialize)]
-struct Page<'a> {
-    name: &'a str,
-    title: String,
-    policy: &'static str,
-    version: &'static str,
-    style: &'static str,
-    script: &'static str,
-    counts: Vec<(String, usize)>,
-    robots: Vec<FleetRowView<'a>>,
-    /// Of the robots those that need a technician, the most urgent first.
-    urgent: Vec<UrgentView<'a>>,
-    /// So many more of them, which stand at the head of the table.
-    more: usize,
-    changes: Vec<ChangeView<'a>>,
-    flagged: usize,
-    diagnosed: bool,
-    compared: bool,
-    grouped: bool,
-}
-
-#[derive(Serialize)]
-struct FleetRowView<'a> {
-    name: String,
-    link: Option<&'a str>,
-    group: String,
-    status: &'a str,
-    reason: Option<&'a str>,
-    before: Option<Figure>,
-    after: Option<Figure>,
-    largest: Option<Figure>,
-    floor: Option<Figure>,
-    held_out: bool,
-    spark: Option<String>,
-    verdict: Option<String>,
-    causes: Option<&'a str>,
-    flags: Option<&'a str>,
-}
-
-/// A robot that needs a technician, and what for.
-#[derive(Serialize)]
-struct UrgentView<'a> {
-    name: String,
-    link: Option<&'a str>,
-    needs: String,
-}
-
-/// A figure as people read it and as the page sorts it.
-#[derive(Serialize)]
-struct Figure {
-    shown: String,
-    value: f64,
-}
-
-#[derive(Serialize)]
-struct ChangeView<'a> {
-    robot: String,
-    effect: &'a str,
-    place: &'a str,
-    parameter: &'a str,
-    change: String,
-    sigma: String,
-    limit: String,
-    unit: &'a str,
-}
 
 /// The page; `links` are the robots' own reports, relative to it.
 pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTreeMap<String, String>) -> Result<String> {
@@ -84,25 +18,27 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
     rows.sort_by_key(|(needs, _)| needs.as_ref().map_or(u8::MAX, |(urgency, _)| *urgency));
     let urgent = rows.iter().filter_map(|(needs, row)| {
         let (_, needs) = needs.clone()?;
-        Some(UrgentView { name: visible(&row.robot), link: links.get(&row.robot).map(String::as_str), needs })
+        Some(json!({ "name": visible(&row.robot), "link": links.get(&row.robot).map(String::as_str), "needs": needs }))
     });
-    let page = Page {
-        more: urgent.clone().count().saturating_sub(NAMED),
-        urgent: urgent.take(NAMED).collect(),
-        name,
-        title: format!("Fleet {name}"),
-        policy: "; script-src 'unsafe-inline'; img-src data:",
-        version: env!("CARGO_PKG_VERSION"),
-        style: include_str!("fleet.css"),
-        script: include_str!("fleet.js"),
-        counts: counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect(),
-        robots: rows.iter().map(|(_, row)| self::row(row, links)).collect(),
-        changes: changes.0.iter().filter(|row| row.flagged).map(change).collect(),
-        flagged: fleet.0.iter().filter(|row| row.flags.is_some()).count(),
-        diagnosed: fleet.0.iter().any(|row| row.verdict.is_some()),
-        compared: fleet.0.iter().any(|row| row.changes.is_some()),
-        grouped: fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
-    };
+    let page = json!({
+        // So many more of them, which stand at the head of the table.
+        "more": urgent.clone().count().saturating_sub(NAMED),
+        // Of the robots those that need a technician, the most urgent first.
+        "urgent": urgent.take(NAMED).collect::<Vec<_>>(),
+        "name": name,
+        "title": format!("Fleet {name}"),
+        "policy": "; script-src 'unsafe-inline'; img-src data:",
+        "version": env!("CARGO_PKG_VERSION"),
+        "style": include_str!("fleet.css"),
+        "script": include_str!("fleet.js"),
+        "counts": counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect::<Vec<_>>(),
+        "robots": rows.iter().map(|(_, row)| self::row(row, links)).collect::<Vec<_>>(),
+        "changes": changes.0.iter().filter(|row| row.flagged).map(change).collect::<Vec<_>>(),
+        "flagged": fleet.0.iter().filter(|row| row.flags.is_some()).count(),
+        "diagnosed": fleet.0.iter().any(|row| row.verdict.is_some()),
+        "compared": fleet.0.iter().any(|row| row.changes.is_some()),
+        "grouped": fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
+    });
     render("fleet.html", include_str!("fleet.html"), &page)
 }
 
@@ -130,40 +66,40 @@ fn needs(row: &FleetRow) -> Option<(u8, String)> {
     (row.verdict.as_deref() == Some("unexplained")).then(|| (4, reason("its error is not explained", row.causes.as_deref())))
 }
 
-fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> FleetRowView<'a> {
-    let figure = |value: Option<f64>| value.map(|value| Figure { shown: format!("{value:.3}"), value });
+fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Value {
+    let figure = |value: Option<f64>| value.map(|value| json!({ "shown": format!("{value:.3}"), "value": value }));
     let group: Vec<&str> = [&row.model, &row.plant, &row.campaign].into_iter().filter_map(|group| group.as_deref()).collect();
-    FleetRowView {
-        name: visible(&row.robot),
-        link: links.get(&row.robot).map(String::as_str),
-        group: group.join(", "),
-        status: &row.status,
-        reason: row.reason.as_deref(),
-        before: figure(row.before_rms_mm),
-        after: figure(row.after_rms_mm),
-        largest: figure(row.after_max_mm),
-        floor: figure(row.floor_mm),
-        held_out: row.held_out.unwrap_or(true),
-        spark: row.course.as_deref().and_then(|course| spark(course, row.floor_mm)),
-        verdict: row.verdict.as_ref().map(|verdict| verdict.replace('_', " ")),
-        causes: row.causes.as_deref(),
-        flags: row.flags.as_deref(),
-    }
+    json!({
+        "name": visible(&row.robot),
+        "link": links.get(&row.robot).map(String::as_str),
+        "group": group.join(", "),
+        "status": &row.status,
+        "reason": row.reason.as_deref(),
+        "before": figure(row.before_rms_mm),
+        "after": figure(row.after_rms_mm),
+        "largest": figure(row.after_max_mm),
+        "floor": figure(row.floor_mm),
+        "held_out": row.held_out.unwrap_or(true),
+        "spark": row.course.as_deref().and_then(|course| spark(course, row.floor_mm)),
+        "verdict": row.verdict.as_ref().map(|verdict| verdict.replace('_', " ")),
+        "causes": row.causes.as_deref(),
+        "flags": row.flags.as_deref(),
+    })
 }
 
-fn change(row: &crate::table::FleetChangeRow) -> ChangeView<'_> {
+fn change(row: &crate::table::FleetChangeRow) -> Value {
     let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
     let show = |value: f64| format!("{:.3e}", value * factor);
-    ChangeView {
-        robot: visible(&row.robot),
-        effect: &row.effect,
-        place: &row.place,
-        parameter: &row.parameter,
-        change: show(row.change),
-        sigma: show(row.sigma),
-        limit: show(row.limit),
-        unit,
-    }
+    json!({
+        "robot": visible(&row.robot),
+        "effect": &row.effect,
+        "place": &row.place,
+        "parameter": &row.parameter,
+        "change": show(row.change),
+        "sigma": show(row.sigma),
+        "limit": show(row.limit),
+        "unit": unit,
+    })
 }
 
 /// Width and height of a sparkline.

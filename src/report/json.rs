@@ -3,7 +3,7 @@
 use super::limits::Judgement;
 use super::{ReportOptions, Tables};
 use crate::error::{Error, Result};
-use crate::table::FormRow;
+use crate::table::{FormRow, VerdictTopic};
 use serde_json::{Value, json};
 
 /// The document; `judgement` is that of the page.
@@ -38,16 +38,15 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
     });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         json!({ "step": row.step, "verdict": row.verdict, "statement": row.statement, "noise_basis": row.noise_basis, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
-            "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>(),
-            "withdrawn": row.withdrawn.iter().flat_map(|text| text.lines()).collect::<Vec<_>>(), "clock": row.clock })
+            "after_rms_mm": row.after_rms_mm, "not_observable": tables.said(&row.step, VerdictTopic::NotObservable),
+            "withdrawn": tables.said(&row.step, VerdictTopic::Withdrawn), "clock": row.clock })
     });
     let withdrawn = tables.withdrawn.iter().map(|gone| {
         json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
     });
     let limits = judgement.map(|judgement| {
-        let lines = judgement.lines.iter().zip(&judgement.values);
-        let lines = lines.map(|((name, _, _, kept), [found, limit])| json!({ "figure": name, "found_mm": found, "limit_mm": limit, "kept": kept }));
-        json!({ "asked": judgement.asked, "kept": judgement.kept, "sentence": judgement.sentence, "figures": lines.collect::<Vec<_>>() })
+        let lines = judgement.found().map(|(row, found)| json!({ "figure": row.figure, "found_mm": found, "limit_mm": row.limit_mm, "kept": row.kept }));
+        json!({ "asked": !judgement.limits.is_empty(), "kept": judgement.kept, "sentence": judgement.sentence, "figures": lines.collect::<Vec<_>>() })
     });
     let document = json!({
         "calib_report": 1,

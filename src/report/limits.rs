@@ -3,8 +3,7 @@
 use super::Tables;
 use super::errors::Steps;
 use super::findings::wrong_setup;
-use super::number::mm;
-use crate::table::StatisticsRow;
+use crate::table::{AcceptanceRow, StatisticsRow};
 
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -20,13 +19,9 @@ pub struct AcceptanceLimits {
 #[derive(Debug)]
 pub(super) struct Judgement {
     pub sentence: String,
-    /// Figure, found, allowed, whether it is kept.
-    pub lines: Vec<(&'static str, String, String, bool)>,
-    /// What was found and what is allowed, mm, of each line.
-    pub values: Vec<[f64; 2]>,
+    /// Limits as they were set; none where a wrong set-up alone is not accepted.
+    pub limits: Vec<AcceptanceRow>,
     pub kept: bool,
-    /// Whether there are limits: a wrong set-up is not accepted without any.
-    pub asked: bool,
 }
 
 /// The row that is judged: of `set`, else of the held-out set with most points, after the step that stands.
@@ -41,31 +36,42 @@ impl Judgement {
     /// None where there are no limits and the set-up is right.
     pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let figures = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
-        let asked = figures.iter().any(|(_, limit)| limit.is_some());
-        let unjudged = |sentence: String| Self { sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
-        if let Some(wrong) = wrong_setup(tables) {
-            return Some(unjudged(format!("Not accepted: {wrong}.")));
-        }
-        if !asked {
+        let wrong = wrong_setup(tables);
+        if wrong.is_none() && figures.iter().all(|(_, limit)| limit.is_none()) {
             return None;
         }
-        let Some(row) = judged(tables, set) else {
-            return Some(unjudged("The limits cannot be judged: no points were held out.".into()));
+        let row = judged(tables, set).filter(|_| wrong.is_none());
+        let found = row.map_or([None; 3], |row| [row.mean_mm, row.p95_mm, row.max_mm].map(Some));
+        let asked = figures.into_iter().zip(found).filter_map(|((name, limit), found)| Some((name, found, limit?)));
+        let asked: Vec<(&str, Option<f64>, f64)> = asked.collect();
+        let is_within = |found: Option<f64>, limit: f64| found.is_some_and(|found| found <= limit);
+        let kept = row.is_some() && asked.iter().all(|(_, found, limit)| is_within(*found, *limit));
+        let sentence = match (wrong, row) {
+            (Some(wrong), _) => format!("Not accepted: {wrong}."),
+            (None, None) => "The limits cannot be judged: no points were held out.".into(),
+            (None, Some(row)) => format!(
+                "{} the limits at {} held-out points of set {}, step {}.",
+                if kept { "Accepted: within" } else { "Not accepted: beyond" },
+                row.points,
+                row.set,
+                row.step
+            ),
         };
-        let found = [row.mean_mm, row.p95_mm, row.max_mm];
-        let judged: Vec<(&'static str, [f64; 2])> =
-            figures.iter().zip(found).filter_map(|((name, limit), found)| Some((*name, [found, (*limit)?]))).collect();
-        let line = |(name, [found, limit]): (&'static str, [f64; 2])| (name, mm(found), mm(limit), found <= limit);
-        let lines: Vec<_> = judged.iter().copied().map(line).collect();
-        let values = judged.iter().map(|(_, values)| *values).collect();
-        let kept = lines.iter().all(|line| line.3);
-        let sentence = format!(
-            "{} the limits at {} held-out points of set {}, step {}.",
-            if kept { "Accepted: within" } else { "Not accepted: beyond" },
-            row.points,
-            row.set,
-            row.step
-        );
-        Some(Self { sentence, lines, values, kept, asked })
+        let limit = |(order, (name, found_mm, limit_mm)): (i64, (&str, Option<f64>, f64))| AcceptanceRow {
+            order,
+            figure: name.into(),
+            found_mm,
+            limit_mm,
+            kept: is_within(found_mm, limit_mm),
+            accepted: kept,
+            sentence: sentence.clone(),
+        };
+        let limits = (1..).zip(asked).map(limit).collect();
+        Some(Self { sentence, limits, kept })
+    }
+
+    /// Limits with what was found.
+    pub fn found(&self) -> impl Iterator<Item = (&AcceptanceRow, f64)> {
+        self.limits.iter().filter_map(|row| Some((row, row.found_mm?)))
     }
 }

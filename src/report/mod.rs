@@ -31,10 +31,11 @@ pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction, Recording,
-    Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
+    Acceptance, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction,
+    Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic,
+    Withdrawn,
 };
-use serde::Serialize;
+use serde_json::json;
 use std::collections::BTreeMap;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
@@ -68,6 +69,8 @@ pub struct Tables {
     /// Of every diagnosis.
     pub verdict: Vec<Verdict>,
     /// Of every diagnosis.
+    pub sentences: Vec<VerdictSentences>,
+    /// Of every diagnosis.
     pub findings: Vec<Findings>,
     /// Of every diagnosis.
     pub finding_numbers: Vec<FindingNumbers>,
@@ -83,6 +86,13 @@ pub struct Tables {
     pub standing: Option<String>,
     /// Later steps that are worse on the same held-out points.
     pub withdrawn: Vec<Withdrawn>,
+}
+
+impl Tables {
+    /// What the diagnosis of a step says of a topic.
+    fn said(&self, step: &str, topic: VerdictTopic) -> Vec<&str> {
+        self.sentences.iter().flat_map(|table| table.about(step, topic)).collect()
+    }
 }
 
 /// What the person who asked for the report chose.
@@ -101,33 +111,14 @@ pub struct ReportOptions<'a> {
     pub hashes: Vec<(String, String)>,
 }
 
-#[derive(Serialize)]
-struct Page<'a> {
-    title: String,
-    policy: &'static str,
-    style: &'static str,
-    version: &'static str,
-    robot: String,
-    certificate: certificate::Certificate,
-    has_identity: bool,
-    hashes: &'a [(String, String)],
-    errors: errors::ErrorsSection,
-    diagnosis: Option<findings::FindingsSection>,
-    closure: Option<closure::ClosureSection>,
-    workspace: Option<errors::WorkspaceSection>,
-    parameters: parameters::ParametersSection,
-    fits: fits::FitsSection,
-    comparisons: Vec<corrections::ComparisonView>,
-    data: data::DataSection,
-    choices: Vec<(&'static str, &'a str)>,
-}
-
 /// The report as HTML and as JSON.
 pub struct Pages {
     /// One file that needs no other.
     pub html: String,
     /// The same for programs.
     pub json: String,
+    /// The user's limits and what was found.
+    pub acceptance: Acceptance,
 }
 
 /// The report; fails where `options.set` is no held-out set.
@@ -137,28 +128,27 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let judgement = limits::Judgement::new(tables, &options.limits, options.set);
     let title = options.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
     let json = json::document(tables, options, &title, judgement.as_ref())?;
-    let page = Page {
-        title,
-        policy: "",
-        certificate: certificate::Certificate::new(tables, &robot, options.identity, judgement.as_ref(), options.set),
-        has_identity: !options.identity.is_empty(),
-        hashes: &options.hashes,
-        diagnosis: findings::FindingsSection::new(tables),
-        style: include_str!("report.css"),
-        version: env!("CARGO_PKG_VERSION"),
-        errors: errors::ErrorsSection::new(tables, &steps, options.set)?,
-        closure: closure::ClosureSection::new(tables),
-        workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
-        parameters: parameters::ParametersSection::new(&tables.parameters, tables.counting.as_deref()),
-        fits: fits::FitsSection::new(tables, &steps),
-        comparisons: corrections::comparisons(tables),
-        data: data::DataSection::new(tables),
-        choices: [("title", options.title), ("set", options.set)]
-            .into_iter()
-            .filter_map(|(name, value)| value.map(|value| (name, value)))
-            .collect(),
-        robot,
-    };
+    let choices = [("title", options.title), ("set", options.set)];
+    let page = json!({
+        "title": title,
+        "policy": "",
+        "certificate": certificate::certificate(tables, &robot, options.identity, judgement.as_ref(), options.set),
+        "has_identity": !options.identity.is_empty(),
+        "hashes": &options.hashes,
+        "diagnosis": findings::section(tables),
+        "style": include_str!("report.css"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "errors": errors::errors_section(tables, &steps, options.set)?,
+        "closure": closure::section(tables),
+        "workspace": errors::workspace_section(&tables.prediction, tables.standing.as_deref()),
+        "parameters": parameters::section(&tables.parameters, tables.counting.as_deref()),
+        "fits": fits::section(tables, &steps),
+        "comparisons": corrections::comparisons(tables),
+        "data": data::section(tables),
+        "choices": choices.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>(),
+        "robot": robot,
+    });
     let html = page::render("report.html", include_str!("report.html"), &page)?;
-    Ok(Pages { html: options.language.page(html).html, json })
+    let acceptance = Acceptance(judgement.map(|judgement| judgement.limits).unwrap_or_default());
+    Ok(Pages { html: options.language.page(html).html, json, acceptance })
 }

@@ -2,86 +2,47 @@
 
 use super::number::{UnitFormat, exact, readings, significant};
 use crate::table::{ParameterRow, Parameters};
-use serde::Serialize;
+use serde_json::{Value, json};
 
-#[derive(Serialize)]
-pub(super) struct ParametersSection {
-    groups: Vec<Group>,
-    /// In which counting the joints' parameters stand, where the controller has another one.
-    counting: Option<String>,
-    /// What was not estimated, and what has a remark.
-    remarks: Vec<RemarkView>,
-}
-
-/// The parameters of one effect.
-#[derive(Serialize)]
-struct Group {
-    effect: String,
-    rows: Vec<ParameterView>,
-}
-
-#[derive(Serialize)]
-struct ParameterView {
-    name: String,
-    place: String,
-    nominal: String,
-    value: String,
-    /// Unit of nominal and value.
-    unit: String,
-    change: String,
-    sigma: String,
-    /// Unit of change and sigma.
-    fine_unit: String,
-    status: String,
-    step: String,
-    stored: String,
-}
-
-#[derive(Serialize)]
-struct RemarkView {
-    name: String,
-    place: String,
-    status: String,
-    remark: String,
-}
-
-impl ParametersSection {
-    pub fn new(parameters: &Parameters, counting: Option<&str>) -> Self {
-        let registered = parameters.effects();
-        let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
-        let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
-        sorted.sort_by_cached_key(|row| (place(row), row.effect.clone(), along_the_chain(&row.name)));
-        let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
-        for &parameter in &sorted {
-            match effects.iter_mut().find(|(effect, _)| *effect == parameter.effect) {
-                Some((_, rows)) => rows.push(parameter),
-                None => effects.push((&parameter.effect, vec![parameter])),
-            }
-        }
-        let groups = effects.into_iter().map(|(effect, rows)| Group {
-            effect: effect.into(),
-            rows: rows.iter().map(|parameter| row(parameter, &rows)).collect(),
-        });
-        let remarked = sorted.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
-        let counting = counting.map(|difference| {
-            format!(
-                "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), \
-                 and \u{201c}calib export --format controller\u{201d} writes them as it does."
-            )
-        });
-        Self {
-            groups: groups.collect(),
-            counting,
-            remarks: remarked
-                .map(|p| RemarkView {
-                    name: p.name.clone(),
-                    place: p.place.clone(),
-                    status: p.status.clone(),
-                    remark: p.remark.clone().unwrap_or_default(),
-                })
-                .collect(),
+pub(super) fn section(parameters: &Parameters, counting: Option<&str>) -> Value {
+    let registered = parameters.effects();
+    let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
+    let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
+    sorted.sort_by_cached_key(|row| (place(row), row.effect.clone(), along_the_chain(&row.name)));
+    let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
+    for &parameter in &sorted {
+        match effects.iter_mut().find(|(effect, _)| *effect == parameter.effect) {
+            Some((_, rows)) => rows.push(parameter),
+            None => effects.push((&parameter.effect, vec![parameter])),
         }
     }
+    let groups = effects.into_iter().map(|(effect, rows)| {
+        json!({
+            "effect": effect,
+            "rows": rows.iter().map(|parameter| row(parameter, &rows)).collect::<Vec<_>>(),
+        })
+    });
+    let remarked = sorted.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
+    let counting = counting.map(|difference| {
+        format!(
+            "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), \
+             and \u{201c}calib export --format controller\u{201d} writes them as it does."
+        )
+    });
+    json!({
+        "groups": groups.collect::<Vec<_>>(),
+        // In which counting the joints' parameters stand, where the controller has another one.
+        "counting": counting,
+        // What was not estimated, and what has a remark.
+        "remarks": remarked
+            .map(|p| json!({
+                "name": p.name,
+                "place": p.place,
+                "status": p.status,
+                "remark": p.remark.clone().unwrap_or_default(),
+            }))
+            .collect::<Vec<_>>(),
+    })
 }
 
 /// Order of a name by its numbers (`j2` before `j10`), shifts before turns (`z` before `rx`).
@@ -101,7 +62,7 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
 }
 
 /// A parameter among those of its effect, with which it shares its decimals.
-fn row(p: &ParameterRow, group: &[&ParameterRow]) -> ParameterView {
+fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Value {
     let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
         Some((coarse, fine)) => read(p, group, coarse, fine),
         // A unit that calib does not know is shown as it is stored.
@@ -114,19 +75,21 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> ParameterView {
             p.unit.clone(),
         ),
     };
-    ParameterView {
-        name: p.name.clone(),
-        place: p.place.clone(),
-        nominal,
-        value,
-        unit,
-        change,
-        sigma,
-        fine_unit,
-        status: p.status.clone(),
-        step: p.step.clone(),
-        stored: if p.unit == "1" { exact(p.value, 7) } else { format!("{} {}", exact(p.value, 7), p.unit) },
-    }
+    json!({
+        "name": p.name,
+        "place": p.place,
+        "nominal": nominal,
+        "value": value,
+        // Unit of nominal and value.
+        "unit": unit,
+        "change": change,
+        "sigma": sigma,
+        // Unit of change and sigma.
+        "fine_unit": fine_unit,
+        "status": p.status,
+        "step": p.step,
+        "stored": if p.unit == "1" { exact(p.value, 7) } else { format!("{} {}", exact(p.value, 7), p.unit) },
+    })
 }
 
 fn read(

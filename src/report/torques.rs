@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 use crate::table::{
     BodyConsistencies, BodyConsistencyRow, ContactRow, Contacts, FrictionCurveRow, FrictionCurves, InertialRow, Inertials,
     JointTorqueRow, JointTorques, Robot, TorqueCourse, TorqueFindingRow, TorqueFindings, TorqueNumbers, TorqueRivals,
-    TorqueVerdict, TorqueVerdictRow,
+    TorqueVerdict, TorqueVerdictRow, VerdictSentences, VerdictTopic,
 };
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// What the page is made of.
 pub struct TorqueTables {
@@ -18,6 +18,8 @@ pub struct TorqueTables {
     pub robot: Robot,
     /// The verdict.
     pub verdict: TorqueVerdict,
+    /// What the diagnosis says beside it.
+    pub sentences: VerdictSentences,
     /// Strongest first.
     pub findings: TorqueFindings,
     /// Their numbers.
@@ -40,73 +42,34 @@ pub struct TorqueTables {
     pub hashes: Vec<(String, String)>,
 }
 
-#[derive(Serialize)]
-struct TorquePage<'a> {
-    title: String,
-    policy: &'static str,
-    style: &'static str,
-    version: &'static str,
-    robot: String,
-    joints: usize,
-    rows: String,
-    kind: &'static str,
-    sentence: String,
-    facts: Vec<String>,
-    findings: Vec<FindingView>,
-    withdrawn: Vec<&'a str>,
-    errors: Vec<Vec<String>>,
-    pictures: Vec<JointView>,
-    contacts: Vec<Vec<String>>,
-    inertials: Vec<Vec<String>>,
-    bodies: Vec<Vec<String>>,
-    not_observable: Vec<&'a str>,
-    remarks: Vec<&'a str>,
-    hashes: &'a [(String, String)],
-}
-
-#[derive(Serialize)]
-struct FindingView {
-    statement: String,
-    probability: String,
-    numbers: String,
-    rivals: String,
-}
-
-#[derive(Serialize)]
-struct JointView {
-    name: String,
-    torque: String,
-    error: String,
-    friction: Option<String>,
-}
-
 /// The page; fails where the verdict is missing.
 pub fn torque_page(tables: &TorqueTables, title: Option<&str>) -> Result<String> {
     let verdict = tables.verdict.0.first();
     let verdict = verdict.ok_or_else(|| Error::Bug("a diagnosis of torques without a verdict".into()))?;
     let robot = data::robot_name(&tables.robot);
-    let page = TorquePage {
-        title: title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
-        policy: "",
-        style: include_str!("report.css"),
-        version: env!("CARGO_PKG_VERSION"),
-        robot,
-        joints: tables.course.joints,
-        rows: count(verdict.rows),
-        kind: if verdict.verdict == "unexplained" { "open" } else { "better" },
-        sentence: format!("{}: {}", verdict.verdict.replace('_', " "), verdict.statement),
-        facts: facts(verdict),
-        findings: findings(tables),
-        withdrawn: verdict.withdrawn.as_deref().map(|text| text.lines().collect()).unwrap_or_default(),
-        errors: errors(&tables.joints),
-        pictures: (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect(),
-        contacts: contacts(&tables.contacts),
-        inertials: inertials(&tables.inertials),
-        bodies: bodies(&tables.consistency),
-        not_observable: verdict.not_observable.lines().collect(),
-        remarks: verdict.remarks.as_deref().map(|text| text.lines().collect()).unwrap_or_default(),
-        hashes: &tables.hashes,
-    };
+    let said = |topic| tables.sentences.about(&verdict.step, topic);
+    let page = json!({
+        "title": title.map_or_else(|| format!("Torques of {robot}"), str::to_owned),
+        "policy": "",
+        "style": include_str!("report.css"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "robot": robot,
+        "joints": tables.course.joints,
+        "rows": count(verdict.rows),
+        "kind": if verdict.verdict == "unexplained" { "open" } else { "better" },
+        "sentence": format!("{}: {}", verdict.verdict.replace('_', " "), verdict.statement),
+        "facts": facts(verdict),
+        "findings": findings(tables),
+        "withdrawn": said(VerdictTopic::Withdrawn),
+        "errors": errors(&tables.joints),
+        "pictures": (0..tables.course.joints).map(|joint| pictures(tables, joint)).collect::<Vec<_>>(),
+        "contacts": contacts(&tables.contacts),
+        "inertials": inertials(&tables.inertials),
+        "bodies": bodies(&tables.consistency),
+        "not_observable": said(VerdictTopic::NotObservable),
+        "remarks": said(VerdictTopic::Remark),
+        "hashes": &tables.hashes,
+    });
     page::render("torques.html", include_str!("torques.html"), &page)
 }
 
@@ -134,7 +97,7 @@ fn facts(verdict: &TorqueVerdictRow) -> Vec<String> {
     ]
 }
 
-fn findings(tables: &TorqueTables) -> Vec<FindingView> {
+fn findings(tables: &TorqueTables) -> Vec<Value> {
     let view = |row: &TorqueFindingRow| {
         let numbers = tables.numbers.0.iter().filter(|number| number.rank == row.rank).map(|number| {
             let sigma = number.sigma.map_or_else(String::new, |sigma| format!(" \u{b1} {}", significant(sigma, 2)));
@@ -142,18 +105,18 @@ fn findings(tables: &TorqueTables) -> Vec<FindingView> {
         });
         let rivals = tables.rivals.0.iter().filter(|rival| rival.rank == row.rank);
         let rivals = rivals.map(|rival| format!("{} at {} {}", rival.effect, rival.place, fixed(rival.probability, 2)));
-        FindingView {
-            statement: row.statement.clone(),
-            probability: format!(
+        json!({
+            "statement": row.statement,
+            "probability": format!(
                 "{} {}, at {} {}",
                 row.effect,
                 fixed(row.probability, 2),
                 row.place,
                 fixed(row.place_probability, 2)
             ),
-            numbers: numbers.collect::<Vec<_>>().join(", "),
-            rivals: rivals.collect::<Vec<_>>().join(", "),
-        }
+            "numbers": numbers.collect::<Vec<_>>().join(", "),
+            "rivals": rivals.collect::<Vec<_>>().join(", "),
+        })
     };
     tables.findings.0.iter().map(view).collect()
 }
@@ -218,7 +181,7 @@ fn bodies(consistency: &BodyConsistencies) -> Vec<Vec<String>> {
     consistency.0.iter().map(row).collect()
 }
 
-fn pictures(tables: &TorqueTables, joint: usize) -> JointView {
+fn pictures(tables: &TorqueTables, joint: usize) -> Value {
     let course = &tables.course;
     let of = |all: &[f64]| course.of_joint(all, joint).collect::<Vec<f64>>();
     let (measured, simulated, corrected) = (of(&course.measured), of(&course.simulated), of(&course.corrected));
@@ -227,12 +190,12 @@ fn pictures(tables: &TorqueTables, joint: usize) -> JointView {
     let name = format!("joint {}", joint + 1);
     let torque = [("s1", simulated.as_slice()), ("s0", &measured), ("s-last", &corrected)];
     let curve: Vec<&FrictionCurveRow> = tables.friction.0.iter().filter(|row| row.joint == joint as i64 + 1).collect();
-    JointView {
-        torque: over_time(course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
-        error: over_time(course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
-        friction: (!curve.is_empty()).then(|| friction(&curve, &format!("friction of {name}"))),
-        name,
-    }
+    json!({
+        "torque": over_time(course, &torque, &format!("torque of {name}: measured, simulated, corrected")),
+        "error": over_time(course, &[("s1", &before), ("s-last", &after)], &format!("error of {name} before and after")),
+        "friction": (!curve.is_empty()).then(|| friction(&curve, &format!("friction of {name}"))),
+        "name": name,
+    })
 }
 
 const WIDTH: f64 = 640.0;

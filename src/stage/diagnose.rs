@@ -16,7 +16,7 @@ use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
     Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
-    Spectrum, Split, Suspects, Verdict,
+    Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,6 +66,9 @@ const MOST_OPEN: f64 = 0.999;
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
 
+const SORTED_OTHERWISE: &str =
+    "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
+
 crate::stage::reads! {
     /// Input ports of [`Diagnose`].
     pub struct DiagnoseReads {
@@ -79,6 +82,7 @@ crate::stage::writes! {
     /// Output ports of [`Diagnose`].
     pub struct DiagnoseWrites {
         verdict: Verdict,
+        sentences: VerdictSentences,
         findings: Findings,
         finding_numbers: FindingNumbers,
         rivals: Rivals,
@@ -96,7 +100,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 25;
+    const IMPLEMENTATION: u32 = 26;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -137,9 +141,7 @@ impl Stage for Diagnose {
         let asked = reads.split.rows(&reads.recording, &self.on)?;
         let (data, corrected) = mismatch(&reads, &asked, context)?;
         if data.sequence.is_some() {
-            let message =
-                "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
-            context.services.warn(message.into());
+            context.services.warn(SORTED_OTHERWISE.into());
         }
         let measured = |row: &usize| values(&data, *row) > 0;
         let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
@@ -200,6 +202,7 @@ impl Stage for Diagnose {
         }
         Ok(DiagnoseWrites {
             verdict: Verdict::of(step, &diagnosis),
+            sentences: VerdictSentences::of_positions(step, &diagnosis),
             findings: Findings::of(&diagnosis),
             finding_numbers: FindingNumbers::of(&diagnosis),
             rivals: Rivals::of(&diagnosis),
@@ -216,7 +219,7 @@ impl Stage for Diagnose {
 
 /// What a diagnosed recording shows beside its findings: rounded logs and brought marks in the statement too, a tool out of place as a warning.
 fn remark(diagnosis: &mut Diagnosis, data: &Measurements, recording: &Recording, context: &Context) {
-    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
+    let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.has_point(*row)).collect();
     let rounded = rounded_logs(&diagnosis.model, data, &points);
     let events = brought::events(&diagnosis.model, &diagnosis.fitted, data, recording, &diagnosis.kept);
     for line in rounded.into_iter().chain(events) {

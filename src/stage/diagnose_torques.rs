@@ -7,7 +7,7 @@ use crate::stage::torque_signal::{HeldOut, RecordedTorques};
 use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{
     ArmMotion, BodyConsistencies, Contacts, FrictionCurves, Inertials, JointTorques, Robot, TorqueCourse, TorqueCovariance,
-    TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals, TorqueVerdict,
+    TorqueFindings, TorqueNumbers, TorqueParameters, TorqueRivals, TorqueVerdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -91,6 +91,7 @@ writes! {
     /// Output ports of [`DiagnoseTorques`].
     pub struct DiagnoseTorquesWrites {
         verdict: TorqueVerdict,
+        sentences: VerdictSentences,
         findings: TorqueFindings,
         numbers: TorqueNumbers,
         rivals: TorqueRivals,
@@ -108,7 +109,7 @@ writes! {
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -164,6 +165,7 @@ impl Stage for DiagnoseTorques {
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;
         Ok(DiagnoseTorquesWrites {
             verdict: TorqueVerdict::of(context.id, &diagnosis, recording.is_current()),
+            sentences: VerdictSentences::of_torques(context.id, &diagnosis),
             findings: TorqueFindings::of(&diagnosis),
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),

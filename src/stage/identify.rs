@@ -105,7 +105,7 @@ impl Stage for Identify {
         let setting = EffectContext { base, load: self.load.into() };
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
-        for effect in asked.filter_map(|cause| cause.whole(&setting)) {
+        for effect in asked.filter_map(|cause| cause.arm_effect(&setting)) {
             if effect.name() == names::ANCHOR && robot.setup().anchors.is_empty() {
                 continue;
             }
@@ -163,7 +163,7 @@ impl Identify {
         if !self.effects.iter().any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
             return;
         }
-        let fit: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
+        let fit: Vec<usize> = rows.iter().copied().filter(|row| data.has_point(*row)).collect();
         let question = Question {
             robot,
             data,

@@ -6,9 +6,9 @@ use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake, JointConventions,
-    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects,
-    Table, Training, Unseen, Verdict, standing,
+    Acceptance, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake,
+    JointConventions, Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics,
+    Step, Suspects, Table, Training, Unseen, Verdict, VerdictSentences, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,6 +61,7 @@ reads! {
         corrections: Vec<Labelled<Corrections>>,
         models: Vec<Labelled<Parameters>>,
         verdict: Vec<Labelled<Verdict>>,
+        sentences: Vec<Labelled<VerdictSentences>>,
         findings: Vec<Labelled<Findings>>,
         finding_numbers: Vec<Labelled<FindingNumbers>>,
         rivals: Vec<Labelled<Rivals>>,
@@ -72,6 +73,7 @@ writes! {
     /// Output ports of `report`.
     pub struct ReportWrites {
         document: Document,
+        acceptance: Acceptance,
         curves: Curves,
     }
 }
@@ -79,7 +81,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 18;
+    const IMPLEMENTATION: u32 = 19;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -128,6 +130,7 @@ impl Stage for Report {
             training: unlabelled(reads.training),
             corrections: unlabelled(reads.corrections),
             verdict: unlabelled(reads.verdict),
+            sentences: unlabelled(reads.sentences),
             findings: unlabelled(reads.findings),
             finding_numbers: unlabelled(reads.finding_numbers),
             rivals: unlabelled(reads.rivals),
@@ -146,7 +149,7 @@ impl Stage for Report {
             |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };
         let html = document("report.html", "text/html", pages.html);
         let json = document("report.json", "application/json", pages.json);
-        Ok(ReportWrites { document: Document(vec![html, json]), curves: tables.curves })
+        Ok(ReportWrites { document: Document(vec![html, json]), acceptance: pages.acceptance, curves: tables.curves })
     }
 
     fn check(&self) -> Vec<Fault> {

@@ -2,10 +2,10 @@
 
 use crate::error::Result;
 use crate::report::{TorqueTables, torque_page};
-use crate::stage::{Context, Stage, reads, writes};
+use crate::stage::{Context, Labelled, Stage, reads, writes};
 use crate::table::{
     BodyConsistencies, Contacts, Document, DocumentRow, FrictionCurves, Inertials, JointTorques, Robot, Table, TorqueCourse,
-    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict,
+    TorqueFindings, TorqueNumbers, TorqueRivals, TorqueVerdict, VerdictSentences,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,7 @@ reads! {
     pub struct ReportTorquesReads {
         robot: Robot,
         verdict: TorqueVerdict,
+        sentences: Vec<Labelled<VerdictSentences>>,
         findings: TorqueFindings,
         numbers: TorqueNumbers,
         rivals: TorqueRivals,
@@ -44,7 +45,7 @@ writes! {
 impl Stage for ReportTorques {
     const NAME: &'static str = "report_torques";
     const SUMMARY: &'static str = "writes one self-contained HTML file: torques before and after, friction, what was found";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = ReportTorquesReads;
     type Writes = ReportTorquesWrites;
 
@@ -58,6 +59,8 @@ impl Stage for ReportTorques {
         let tables = TorqueTables {
             robot: reads.robot,
             verdict: reads.verdict,
+            // Other diagnoses of the pipeline have theirs: each is asked for by its step.
+            sentences: VerdictSentences(reads.sentences.into_iter().flat_map(|of| of.table.0).collect()),
             findings: reads.findings,
             numbers: reads.numbers,
             rivals: reads.rivals,

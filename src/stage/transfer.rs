@@ -195,7 +195,7 @@ fn is_geometry(row: &ParameterRow) -> bool {
 fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> ComparedRows {
     let aside =
         |row: usize| screenings.iter().all(|one| one.suspects.iter().any(|suspect| suspect.row == row && !suspect.used()));
-    let whole: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row) && !aside(*row)).collect();
+    let whole: Vec<usize> = (0..data.rows()).filter(|row| data.has_point(*row) && !aside(*row)).collect();
     let (choose, others): (Vec<usize>, Vec<usize>) = whole.into_iter().partition(|row| asked.contains(row));
     ComparedRows { judge: if others.is_empty() { choose.clone() } else { others }, choose }
 }

@@ -13,55 +13,8 @@ use arrow::datatypes::{DataType, Field};
 use crate::error::{Error, Result};
 use crate::units::Unit;
 
-/// The schema files, one per table kind.
-const SCHEMAS: &[&str] = &[
-    include_str!("../../schemas/body_consistency.json"),
-    include_str!("../../schemas/changes.json"),
-    include_str!("../../schemas/contacts.json"),
-    include_str!("../../schemas/convention.json"),
-    include_str!("../../schemas/corrections.json"),
-    include_str!("../../schemas/covariance.json"),
-    include_str!("../../schemas/curves.json"),
-    include_str!("../../schemas/document.json"),
-    include_str!("../../schemas/finding_numbers.json"),
-    include_str!("../../schemas/findings.json"),
-    include_str!("../../schemas/fit.json"),
-    include_str!("../../schemas/fleet.json"),
-    include_str!("../../schemas/fleet_changes.json"),
-    include_str!("../../schemas/forms.json"),
-    include_str!("../../schemas/friction_curves.json"),
-    include_str!("../../schemas/inertials.json"),
-    include_str!("../../schemas/intake.json"),
-    include_str!("../../schemas/joint_torques.json"),
-    include_str!("../../schemas/motion.json"),
-    include_str!("../../schemas/network.json"),
-    include_str!("../../schemas/observability.json"),
-    include_str!("../../schemas/parameters.json"),
-    include_str!("../../schemas/prediction.json"),
-    include_str!("../../schemas/recording.json"),
-    include_str!("../../schemas/rejected.json"),
-    include_str!("../../schemas/rivals.json"),
-    include_str!("../../schemas/robot.json"),
-    include_str!("../../schemas/scoreboard.json"),
-    include_str!("../../schemas/search_course.json"),
-    include_str!("../../schemas/searches.json"),
-    include_str!("../../schemas/shares.json"),
-    include_str!("../../schemas/spectrum.json"),
-    include_str!("../../schemas/split.json"),
-    include_str!("../../schemas/statistics.json"),
-    include_str!("../../schemas/suspects.json"),
-    include_str!("../../schemas/torque_changes.json"),
-    include_str!("../../schemas/torque_course.json"),
-    include_str!("../../schemas/torque_covariance.json"),
-    include_str!("../../schemas/torque_findings.json"),
-    include_str!("../../schemas/torque_numbers.json"),
-    include_str!("../../schemas/torque_parameters.json"),
-    include_str!("../../schemas/torque_rivals.json"),
-    include_str!("../../schemas/torque_verdict.json"),
-    include_str!("../../schemas/training.json"),
-    include_str!("../../schemas/truth.json"),
-    include_str!("../../schemas/verdict.json"),
-];
+/// The schema files, one per table kind, as build.rs lists them.
+const SCHEMAS: &[&str] = include!(concat!(env!("OUT_DIR"), "/schemas.rs"));
 
 static PARSED: LazyLock<BTreeMap<String, TableSchema>> = LazyLock::new(|| {
     let parse = |text: &&str| TableSchema::parse(text).expect("embedded schemas are valid");

@@ -1,17 +1,14 @@
 //! The rivals of each learned correction as text and as JSON.
 
+use super::tables;
 use crate::error::Result;
 use crate::pipeline::CompletedRun;
 use crate::store::Store;
-use crate::table::{Corrections, CorrectionsRow, Table};
+use crate::table::{Corrections, CorrectionsRow};
 use serde_json::json;
 
 fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<CorrectionsRow>> {
-    let mut rows = Vec::new();
-    for output in outcome.tables(Corrections::KIND) {
-        rows.extend(Corrections::from_frame(&store.load(&output.table)?)?.0);
-    }
-    Ok(rows)
+    Ok(tables::<Corrections>(outcome, store)?.into_iter().flat_map(|table| table.0).collect())
 }
 
 /// One line per rival, the kept one marked; nothing where nothing was learnt.
@@ -50,13 +47,5 @@ pub fn corrections(outcome: &CompletedRun, store: &Store) -> Result<String> {
 
 /// Rivals of learned corrections, as JSON.
 pub fn corrections_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
-    let row = |row: CorrectionsRow| {
-        json!({
-            "step": row.step, "rival": row.rival, "chosen": row.chosen, "reason": row.reason, "before_mm": row.before_mm,
-            "mean_mm": row.mean_mm, "rms_mm": row.rms_mm, "max_mm": row.max_mm, "gain_mm": row.gain_mm,
-            "gain_sigma_mm": row.gain_sigma_mm, "numbers": row.numbers, "evaluations": row.evaluations,
-            "hidden": row.hidden, "decay": row.decay,
-        })
-    };
-    Ok(rows(outcome, store)?.into_iter().map(row).collect())
+    Ok(json!(rows(outcome, store)?))
 }

@@ -3,36 +3,34 @@
 use super::labelled;
 use crate::error::{Error, Result};
 use crate::pipeline::{CompletedRun, Manifest};
+use crate::stage::{Report, Stage};
 use crate::store::Store;
-use crate::table::{Document, Table};
-use serde::{Deserialize, Serialize};
+use crate::table::{Acceptance, AcceptanceRow, Table};
+use serde::Serialize;
 use serde_json::Value;
 
 /// The judgements of a run's reports, those alone that have limits.
 pub struct LimitsSummary(Vec<Judged>);
 
-/// A judgement as the report's document for programs has it, and the report's stage.
-#[derive(Serialize, Deserialize)]
+/// A judgement and the report's stage.
+#[derive(Serialize)]
 struct Judged {
-    #[serde(default)]
     stage: String,
-    #[serde(default, skip_serializing)]
-    asked: bool,
     kept: bool,
     sentence: String,
     figures: Vec<Figure>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize)]
 struct Figure {
     figure: String,
-    found_mm: Option<f64>,
-    limit_mm: Option<f64>,
+    found_mm: f64,
+    limit_mm: f64,
     kept: bool,
 }
 
 impl LimitsSummary {
-    /// Of all reports of a run. Fails where a document has left the store.
+    /// Of all reports of a run. Fails where a table has left the store, or a report is older than the table.
     pub fn read(outcome: &CompletedRun, store: &Store) -> Result<Self> {
         Self::of(&outcome.manifest, store)
     }
@@ -40,13 +38,12 @@ impl LimitsSummary {
     /// Of all reports of the record of a run.
     pub fn of(manifest: &Manifest, store: &Store) -> Result<Self> {
         let mut all = Vec::new();
-        for stage in &manifest.stages {
-            for output in stage.outputs.iter().filter(|output| output.kind == Document::KIND) {
-                let documents = Document::from_frame(&store.load(&output.table)?)?.0;
-                for document in documents.iter().filter(|document| document.media_type == "application/json") {
-                    all.extend(judged(&stage.id, &document.content)?);
-                }
-            }
+        for stage in manifest.stages.iter().filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty()) {
+            let Some(own) = stage.outputs.iter().find(|output| output.kind == Acceptance::KIND) else {
+                let message = "its report was made by an earlier calib, which kept limits elsewhere; run the pipeline again";
+                return Err(Error::data(&manifest.run_id, message));
+            };
+            all.extend(judged(&stage.id, Acceptance::from_frame(&store.load(&own.table)?)?));
         }
         Ok(Self(all))
     }
@@ -73,22 +70,21 @@ impl LimitsSummary {
 }
 
 /// What a report says of its limits; none where it has none.
-fn judged(stage: &str, content: &str) -> Result<Option<Judged>> {
-    let bug = |error: serde_json::Error| Error::Bug(format!("the document of the report `{stage}`: {error}"));
-    let mut report: Value = serde_json::from_str(content).map_err(bug)?;
-    let limits = report.get_mut("limits").map(Value::take).unwrap_or_default();
-    let judged: Option<Judged> = serde_json::from_value(limits).map_err(bug)?;
-    Ok(judged.filter(|judged| judged.asked).map(|judged| Judged { stage: stage.into(), ..judged }))
+fn judged(stage: &str, Acceptance(rows): Acceptance) -> Option<Judged> {
+    let first = rows.first()?;
+    let (kept, sentence) = (first.accepted, first.sentence.clone());
+    let figure = |row: AcceptanceRow| {
+        let AcceptanceRow { figure, limit_mm, kept, .. } = row;
+        Some(Figure { figure, found_mm: row.found_mm?, limit_mm, kept })
+    };
+    Some(Judged { stage: stage.into(), kept, sentence, figures: rows.into_iter().filter_map(figure).collect() })
 }
 
 impl Judged {
     /// The judgement, then the figures that are beyond, or all where none is.
     fn words(&self) -> String {
-        let length = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
-        let allowed = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| value.to_string());
         let told = self.figures.iter().filter(|figure| figure.kept == self.kept);
-        let told =
-            told.map(|one| format!("{} {} mm, at most {} mm allowed", one.figure, length(one.found_mm), allowed(one.limit_mm)));
+        let told = told.map(|one| format!("{} {:.4} mm, at most {} mm allowed", one.figure, one.found_mm, one.limit_mm));
         let told: Vec<String> = told.collect();
         let mut letters = self.sentence.trim_end_matches('.').chars();
         let first = letters.next().map(|letter| letter.to_lowercase().to_string()).unwrap_or_default();
@@ -100,16 +96,23 @@ impl Judged {
 #[cfg(test)]
 mod tests {
     use super::judged;
+    use crate::table::{Acceptance, AcceptanceRow};
 
     #[test]
     fn a_line_names_what_is_beyond_and_a_report_without_limits_has_none() {
-        let limits = r#"{"asked": true, "kept": false, "sentence": "Not accepted: beyond the limits.", "figures": [
-            {"figure": "mean", "found_mm": 0.0421, "limit_mm": 0.03, "kept": false},
-            {"figure": "largest", "found_mm": 0.1, "limit_mm": 0.5, "kept": true}]}"#;
-        let read = |limits: &str| judged("report", &format!(r#"{{"calib_report": 1, "limits": {limits}}}"#)).expect("a document");
-        let words = read(limits).map(|judged| judged.words());
-        assert_eq!(words.as_deref(), Some("not accepted: beyond the limits: mean 0.0421 mm, at most 0.03 mm allowed"));
-        assert!(read("null").is_none());
-        assert!(read(&limits.replace("\"asked\": true", "\"asked\": false")).is_none(), "a wrong set-up is judged unasked");
+        let row = |figure: &str, found_mm, limit_mm, kept| AcceptanceRow {
+            order: 1,
+            figure: figure.into(),
+            found_mm,
+            limit_mm,
+            kept,
+            accepted: false,
+            sentence: "Not accepted: beyond the limits.".into(),
+        };
+        let words = |rows| judged("report", Acceptance(rows)).map(|judged| judged.words());
+        let found = vec![row("mean", Some(0.0421), 0.03, false), row("largest", Some(0.1), 0.5, true)];
+        assert_eq!(words(found).as_deref(), Some("not accepted: beyond the limits: mean 0.0421 mm, at most 0.03 mm allowed"));
+        assert_eq!(words(vec![row("mean", None, 0.03, false)]).as_deref(), Some("not accepted: beyond the limits"));
+        assert!(words(Vec::new()).is_none(), "a wrong set-up is judged unasked");
     }
 }

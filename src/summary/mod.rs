@@ -42,3 +42,13 @@ pub use run_diff::run_diff;
 pub use searches::{searches, searches_json};
 pub use statistics::{rejected, rejected_rows, statistics, statistics_json};
 pub use torques::TorqueSummary;
+
+use crate::error::Result;
+use crate::pipeline::CompletedRun;
+use crate::store::Store;
+use crate::table::Table;
+
+/// All tables of a kind that a run wrote. Fails where one has left the store.
+fn tables<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<Vec<T>> {
+    outcome.tables(T::KIND).map(|output| T::from_frame(&store.load(&output.table)?)).collect()
+}

@@ -1,17 +1,14 @@
 //! The comparison of optimisers as text and as JSON.
 
+use super::tables;
 use crate::error::Result;
 use crate::pipeline::CompletedRun;
 use crate::store::Store;
-use crate::table::{Searches, SearchesRow, Table};
+use crate::table::{Searches, SearchesRow};
 use serde_json::json;
 
 fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<SearchesRow>> {
-    let mut rows = Vec::new();
-    for output in outcome.tables(Searches::KIND) {
-        rows.extend(Searches::from_frame(&store.load(&output.table)?)?.0);
-    }
-    Ok(rows)
+    Ok(tables::<Searches>(outcome, store)?.into_iter().flat_map(|table| table.0).collect())
 }
 
 /// One line per function and optimiser; nothing where nothing was searched.
@@ -61,14 +58,5 @@ pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
 
 /// Optimisers beside each other, as JSON.
 pub fn searches_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
-    let row = |row: SearchesRow| {
-        json!({
-            "step": row.step, "function": row.function, "dimensions": row.dimensions, "method": row.method,
-            "tolerance": row.tolerance, "searches": row.searches, "found": row.found, "stuck": row.stuck,
-            "evaluations_median": row.evaluations_median, "evaluations_p90": row.evaluations_p90,
-            "error_median": row.error_median, "error_p90": row.error_p90,
-            "reference": row.reference, "reference_s": row.reference_s,
-        })
-    };
-    Ok(rows(outcome, store)?.into_iter().map(row).collect())
+    Ok(json!(rows(outcome, store)?))
 }

@@ -1,6 +1,6 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
-use super::labelled;
+use super::{labelled, tables};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
 use crate::store::Store;
@@ -9,11 +9,7 @@ use serde_json::json;
 
 /// The rows of all tables `statistics` of a run.
 pub(super) fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
-    let mut rows = Vec::new();
-    for output in outcome.tables(Statistics::KIND) {
-        rows.extend(Statistics::from_frame(&store.load(&output.table)?)?.0);
-    }
-    Ok(rows)
+    Ok(tables::<Statistics>(outcome, store)?.into_iter().flat_map(|table| table.0).collect())
 }
 
 /// Three tables: points that no model has seen, those that the models were fitted to, and these again
@@ -141,24 +137,7 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
 
 /// Errors of every step and set, as JSON.
 pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
-    let row = |row: StatisticsRow| {
-        json!({
-            "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
-            "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
-            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
-            "noise_basis": row.noise_basis,
-            "suspects": row.suspects, "mean_without_mm": row.mean_without_mm, "rms_without_mm": row.rms_without_mm,
-            "max_without_mm": row.max_without_mm,
-            "remarked": row.remarked, "mean_remarked_mm": row.mean_remarked_mm, "max_remarked_mm": row.max_remarked_mm,
-            "remarked_points": row.remarked_points,
-            "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
-            "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
-            "fold_expected_mm": row.fold_expected_mm,
-            "reference": row.reference, "reference_mean_mm": row.reference_mean_mm,
-            "reference_std_mm": row.reference_std_mm, "reference_max_mm": row.reference_max_mm,
-        })
-    };
-    Ok(rows(outcome, store)?.into_iter().map(row).collect())
+    Ok(json!(rows(outcome, store)?))
 }
 
 /// How many rows of the raw files were rejected.

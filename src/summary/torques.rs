@@ -6,13 +6,14 @@ use crate::pipeline::StageReport;
 use crate::store::Store;
 use crate::table::{
     ContactRow, Contacts, JointTorqueRow, JointTorques, Table, TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers,
-    TorqueRivalRow, TorqueRivals, TorqueVerdict, TorqueVerdictRow,
+    TorqueRivalRow, TorqueRivals, TorqueVerdict, TorqueVerdictRow, VerdictSentences, VerdictTopic,
 };
 use serde_json::{Value, json};
 
 /// The tables of a diagnosis of torques.
 pub struct TorqueSummary {
     verdict: TorqueVerdictRow,
+    sentences: VerdictSentences,
     findings: Vec<TorqueFindingRow>,
     numbers: Vec<TorqueNumberRow>,
     rivals: Vec<TorqueRivalRow>,
@@ -35,6 +36,7 @@ impl TorqueSummary {
         let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
         Ok(Self {
             verdict,
+            sentences: table(stage, store)?,
             findings: table::<TorqueFindings>(stage, store)?.0,
             numbers: table::<TorqueNumbers>(stage, store)?.0,
             rivals: table::<TorqueRivals>(stage, store)?.0,
@@ -68,8 +70,8 @@ impl TorqueSummary {
         own
     }
 
-    fn lines(text: &str) -> Vec<&str> {
-        text.lines().collect()
+    fn said(&self, topic: VerdictTopic) -> Vec<&str> {
+        self.sentences.about(&self.verdict.step, topic)
     }
 
     /// The diagnosis as one document.
@@ -129,11 +131,11 @@ impl TorqueSummary {
             "before": before, "after": after,
             "findings": findings.collect::<Vec<_>>(),
             "contacts": contacts.collect::<Vec<_>>(),
-            "withdrawn": v.withdrawn.as_deref().map(Self::lines).unwrap_or_default(),
-            "not_observable": Self::lines(&v.not_observable),
+            "withdrawn": self.said(VerdictTopic::Withdrawn),
+            "not_observable": self.said(VerdictTopic::NotObservable),
             "noise": noise.collect::<Vec<_>>(),
             "leftover": leftover.collect::<Vec<_>>(),
-            "remarks": v.remarks.as_deref().map(Self::lines).unwrap_or_default(),
+            "remarks": self.said(VerdictTopic::Remark),
         })
     }
 
@@ -148,7 +150,6 @@ impl TorqueSummary {
 
     /// What `calib diagnose` prints unless all is asked for.
     pub fn short(&self) -> String {
-        let v = &self.verdict;
         let mut text = labelled("verdict", &self.verdict());
         text.push_str(&labelled("error", &self.errors()));
         for finding in &self.findings {
@@ -159,13 +160,13 @@ impl TorqueSummary {
             let told = format!("{statement}; probability of {} {:.2}{rivals}", finding.effect, finding.probability);
             text.push_str(&labelled(&format!("{:>3}.", finding.rank), &told));
         }
-        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+        for line in self.said(VerdictTopic::Withdrawn) {
             text.push_str(&labelled("withdrawn", line));
         }
         for row in &self.joints {
             text.extend(row.signature.iter().map(|left| labelled("left", &format!("joint {}: {left}", row.joint))));
         }
-        let unseen: Vec<&str> = Self::lines(&v.not_observable);
+        let unseen = self.said(VerdictTopic::NotObservable);
         if !unseen.is_empty() {
             text.push_str(&labelled("limits", &format!("not observable from these data: {}", unseen.join("; "))));
         }
@@ -174,7 +175,6 @@ impl TorqueSummary {
 
     /// All of the diagnosis, as `calib diagnose --details` prints it.
     pub fn text(&self) -> String {
-        let v = &self.verdict;
         let mut text = format!("{}\n\nerror: {}\n", self.verdict(), self.errors());
         text.push_str("joint   rms before   after   moving   resting   noise  (Nm)  autocorrelation\n");
         let nm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
@@ -210,13 +210,13 @@ impl TorqueSummary {
                 text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }
         }
-        for (label, lines) in [("withdrawn", v.withdrawn.as_deref()), ("not observable", Some(v.not_observable.as_str()))] {
-            lines.iter().flat_map(|text| text.lines()).for_each(|line| text.push_str(&format!("{label}: {line}\n")));
+        for (label, topic) in [("withdrawn", VerdictTopic::Withdrawn), ("not observable", VerdictTopic::NotObservable)] {
+            self.said(topic).into_iter().for_each(|line| text.push_str(&format!("{label}: {line}\n")));
         }
         for row in &self.joints {
             text.extend(row.signature.iter().map(|left| format!("what is left at joint {}: {left}\n", row.joint)));
         }
-        v.remarks.iter().flat_map(|text| text.lines()).for_each(|line| text.push_str(&format!("{line}\n")));
+        self.said(VerdictTopic::Remark).into_iter().for_each(|line| text.push_str(&format!("{line}\n")));
         text
     }
 }

@@ -1,24 +1,7 @@
 //! Times in which something pushed on the arm.
 
+use super::{ContactRow, Contacts};
 use crate::dynamics::TorqueDiagnosis;
-
-crate::table::rows! { "contacts",
-    /// Events, one a row; key `event`.
-    pub struct Contacts of ContactRow {
-        event: i64,
-        start_s: f64,
-        end_s: f64,
-        /// From 1, strongest first.
-        joints: String,
-        force_x_n: f64,
-        force_y_n: f64,
-        force_z_n: f64,
-        sigma_x_n: f64,
-        sigma_y_n: f64,
-        sigma_z_n: f64,
-        gain: f64,
-    }
-}
 
 impl Contacts {
     /// A row for each event, in the order of time.

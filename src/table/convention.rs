@@ -1,24 +1,10 @@
 //! How the controller counts its joints, as a table.
 
+use super::{JointConventionRow, JointConventions};
 use crate::error::{Error, Result};
 use crate::robot::{CountedCoupling, JointConvention};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
-
-crate::table::rows! { "convention",
-    /// Joints, one a row; key `joint`, from 1.
-    pub struct JointConventions of JointConventionRow {
-        joint: i64,
-        /// 1 or -1.
-        sign: f64,
-        /// Of a revolute joint; else null.
-        zero_rad: Option<f64>,
-        /// Of a prismatic joint; else null.
-        zero_mm: Option<f64>,
-        /// JSON `[{"by": 2, "ratio": -1.0, "order": 1}]`, joints and order from 1.
-        coupled: Option<String>,
-    }
-}
 
 /// A cell of the column `coupled`.
 #[derive(Serialize, Deserialize)]

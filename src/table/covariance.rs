@@ -1,19 +1,6 @@
 //! The covariance of the estimated parameters, from the rows that they were fitted to.
 
-crate::table::rows! { "covariance",
-    /// Pairs of estimated parameters, each once; key (`parameter`, `other`), with `parameter` not after `other` in the alphabet.
-    pub struct CovarianceTable of CovarianceRow {
-        parameter: String,
-        other: String,
-        /// In the product of the two parameters' units of the table `parameters`.
-        covariance: f64,
-        /// E.g. `mm rad`.
-        unit: String,
-        /// -1 to 1.
-        correlation: f64,
-    }
-}
-
+use super::{CovarianceRow, CovarianceTable};
 use crate::effect::ParameterSpec;
 use crate::estimate::{Covariance, Fitted, Model};
 use std::collections::{BTreeMap, BTreeSet};

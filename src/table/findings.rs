@@ -1,71 +1,9 @@
 //! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
 
+use super::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
 use crate::diagnose::{Diagnosis, Finding};
 use crate::effect::cause;
 use crate::observation::Dimension;
-
-crate::table::rows! { "findings",
-    /// Findings, strongest first; key `rank`.
-    pub struct Findings of FindingRow {
-        /// From 1.
-        rank: i64,
-        /// Canonical effect name.
-        effect: String,
-        /// E.g. `joint 3`.
-        place: String,
-        /// One sentence for a person.
-        statement: String,
-        f_statistic: Option<f64>,
-        p_value: Option<f64>,
-        /// How much worse the criterion is without it.
-        delta_bic: Option<f64>,
-        /// By how much the held-out rms is larger without it; null where no rows are held out, or several effects make it up.
-        heldout_gain_mm: Option<f64>,
-        /// Rms of the whole effect over the fitted rows.
-        effect_rms_mm: Option<f64>,
-        /// The same where the rows to fit measured angles and no length.
-        heldout_gain_rad: Option<f64>,
-        effect_rms_rad: Option<f64>,
-        /// That it is this effect at this place; that it acts at this place; that it is none of the names, rivals among them.
-        probability: Option<f64>,
-        place_probability: Option<f64>,
-        none_probability: Option<f64>,
-        /// Joint whose range bounds it, from 1.
-        valid_joint: Option<i64>,
-        valid_from_rad: Option<f64>,
-        valid_to_rad: Option<f64>,
-        /// The same of a joint that slides.
-        valid_from_mm: Option<f64>,
-        valid_to_mm: Option<f64>,
-        /// Its forms as JSON, by which the model is rebuilt.
-        forms: String,
-    }
-}
-
-crate::table::rows! { "finding_numbers",
-    /// Numbers of findings; key (`rank`, `name`).
-    pub struct FindingNumbers of FindingNumberRow {
-        rank: i64,
-        name: String,
-        value: f64,
-        unit: String,
-        /// One standard deviation.
-        sigma: Option<f64>,
-    }
-}
-
-crate::table::rows! { "rivals",
-    /// Explanations that these data cannot tell from a finding; key (`rank`, `effect`, `place`).
-    pub struct Rivals of RivalRow {
-        rank: i64,
-        effect: String,
-        place: String,
-        /// Criterion with the rival in place of the finding, minus that of the finding.
-        delta_bic: f64,
-        /// That it is the rival and not the finding.
-        probability: Option<f64>,
-    }
-}
 
 impl FindingRow {
     /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
@@ -91,7 +29,7 @@ const EXCLUDED: f64 = 0.005;
 
 /// Whether more poses may separate an effect of these tables from others.
 pub fn is_separable_by_poses(effect: &str) -> bool {
-    cause(effect).is_none_or(|cause| cause.is_separable_by_poses())
+    cause(effect).is_none_or(|cause| cause.about().separable_by_poses)
 }
 
 fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &Finding)> {

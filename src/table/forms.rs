@@ -1,30 +1,7 @@
 //! Formulas for findings without a name, with their numbers.
 
+use super::{FormRow, Forms};
 use crate::diagnose::Diagnosis;
-
-crate::table::rows! { "forms",
-    /// Numbers of formulas; key (`rank`, `form`, `number`).
-    pub struct Forms of FormRow {
-        /// The finding's.
-        rank: i64,
-        /// From 1, cheapest first.
-        form: i64,
-        number: String,
-        formula: String,
-        price: i64,
-        /// Rms of fitted rows under fits that did not see their pose: with the formula, with the finding as it is, without both.
-        folds_rms_mm: f64,
-        curve_rms_mm: f64,
-        without_rms_mm: f64,
-        /// The cheapest that is as good as the best.
-        proposed: bool,
-        value: f64,
-        unit: String,
-        sigma: Option<f64>,
-        /// The effect as it may be declared, as JSON.
-        declaration: String,
-    }
-}
 
 impl Forms {
     /// Of a diagnosis.

@@ -1,18 +1,7 @@
 //! Torque of friction over velocity, joint by joint.
 
+use super::{FrictionCurveRow, FrictionCurves};
 use crate::dynamics::TorqueDiagnosis;
-
-crate::table::rows! { "friction_curves",
-    /// Points of the curves of all joints with friction; key (`joint`, `velocity_rad_s`).
-    pub struct FrictionCurves of FrictionCurveRow {
-        /// From 1.
-        joint: i64,
-        velocity_rad_s: f64,
-        torque_nm: f64,
-        /// One standard deviation.
-        sigma_nm: f64,
-    }
-}
 
 impl FrictionCurves {
     /// The curves that were found.

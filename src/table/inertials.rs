@@ -1,20 +1,7 @@
 //! Masses, first moments and inertias of the links, as the torques show them.
 
+use super::{InertialRow, Inertials};
 use crate::dynamics::TorqueDiagnosis;
-
-crate::table::rows! { "inertials",
-    /// Ten numbers a link; key (`link`, `quantity`).
-    pub struct Inertials of InertialRow {
-        /// From 1; the last carries the payload.
-        link: i64,
-        quantity: String,
-        value: f64,
-        unit: String,
-        declared: Option<f64>,
-        /// One standard deviation.
-        sigma: f64,
-    }
-}
 
 impl Inertials {
     /// The numbers of a diagnosis.

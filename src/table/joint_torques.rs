@@ -1,27 +1,7 @@
 //! Noise and errors of the torque of each joint.
 
+use super::{JointTorqueRow, JointTorques};
 use crate::dynamics::TorqueDiagnosis;
-
-crate::table::rows! { "joint_torques",
-    /// Joints, one a row; key `joint`. Errors are of held-out rows where there are any.
-    pub struct JointTorques of JointTorqueRow {
-        /// From 1.
-        joint: i64,
-        noise_nm: f64,
-        autocorrelation: f64,
-        before_rms_nm: f64,
-        after_rms_nm: f64,
-        before_nrmse: f64,
-        after_nrmse: f64,
-        before_moving_rms_nm: Option<f64>,
-        after_moving_rms_nm: Option<f64>,
-        before_rest_rms_nm: Option<f64>,
-        after_rest_rms_nm: Option<f64>,
-        leftover_rms_nm: f64,
-        leftover_over_noise: f64,
-        signature: Option<String>,
-    }
-}
 
 impl JointTorques {
     /// A row for each joint.

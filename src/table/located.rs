@@ -1,41 +1,7 @@
 //! Where the residual sits and what it depends on, before and after the findings: two tables.
 
+use super::{ShareRow, Shares, Spectrum, SpectrumRow};
 use crate::diagnose::{Diagnosis, Located};
-
-crate::table::rows! { "shares",
-    /// The most that any single cause at a place, or of a variable, could explain; key (`moment`, `by`, `name`).
-    pub struct Shares of ShareRow {
-        /// `before` the findings or `after` them.
-        moment: String,
-        /// `place` or `variable`.
-        by: String,
-        /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
-        name: String,
-        /// Of the squared residual, in standard deviations.
-        share: f64,
-        /// How many numbers it takes.
-        numbers: i64,
-        /// Fall of the Bayesian information criterion: positive where it is more than chance.
-        delta_bic: f64,
-        /// The effect that does it.
-        effect: String,
-    }
-}
-
-crate::table::rows! { "spectrum",
-    /// What each order of each joint explains; key (`moment`, `joint`, `of`, `order`).
-    pub struct Spectrum of SpectrumRow {
-        /// `before` the findings or `after` them.
-        moment: String,
-        /// From 1.
-        joint: i64,
-        /// `joint` or `motor`: whose turn the order counts.
-        of: String,
-        order: i64,
-        /// Of the squared residual, in standard deviations, that a sine and a cosine explain.
-        share: f64,
-    }
-}
 
 fn moments(diagnosis: &Diagnosis) -> [(&'static str, &Located); 2] {
     [("after", &diagnosis.located_after), ("before", &diagnosis.located_before)]

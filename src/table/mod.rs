@@ -1,11 +1,12 @@
-//! The bridge between Parquet columns and Rust values: one file per table, one schema file each in `schemas/`.
+//! The bridge between Parquet columns and Rust values: each table has a schema file in `schemas/`.
 //!
-//! Most tables are a list of rows declared by `rows!`; only the recording, whose columns depend on the number of joints,
-//! is written by hand.
+//! Most tables are a list of rows, and a row is a struct whose fields are the columns of the schema file (build.rs reads it); only
+//! tables with columns for each joint are written by hand. A file of this folder says how tables are filled and what is made of them.
 
 use crate::error::Result;
 pub use crate::store::Loose;
 pub use crate::store::frame::Frame;
+use crate::store::frame::{Cell, FrameBuilder};
 use std::path::Path;
 
 /// A table kind: Rust values that go to and from checked columns.
@@ -32,29 +33,23 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
     Ok(Loose { table: T::from_frame(&loose.table)?, vouched: loose.vouched })
 }
 
-/// Declares a table as a list of rows: `rows! { "kind", /// doc pub struct Name of Row { column: type, ... } }`.
+/// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (build.rs).
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
         #[doc = concat!("A row of the table `", $kind, "`.")]
-        #[derive(Debug, Clone, PartialEq)]
-        pub struct $row { $(
-            #[doc = concat!("Column `", stringify!($field), "`; its unit and meaning stand in the schema of the table.")]
-            #[doc = ""]
-            $(#[$fdoc])*
-            pub $field: $ty,
-        )+ }
+        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
         $(#[$doc])*
         #[derive(Debug, Clone, Default, PartialEq)]
         pub struct $table(pub Vec<$row>);
-        impl crate::table::Table for $table {
+        impl Table for $table {
             const KIND: &'static str = $kind;
-            fn to_frame(&self) -> crate::error::Result<crate::store::frame::Frame> {
-                use crate::store::frame::Cell;
-                let mut frame = crate::store::frame::FrameBuilder::new(Self::KIND);
+            fn to_frame(&self) -> Result<Frame> {
+                let mut frame = FrameBuilder::new(Self::KIND);
                 $( frame.push_present(stringify!($field), <$ty as Cell>::to_array(self.0.iter().map(|row| row.$field.clone()).collect()))?; )+
                 frame.finish()
             }
-            fn from_frame(frame: &crate::store::frame::Frame) -> crate::error::Result<Self> {
+            fn from_frame(frame: &Frame) -> Result<Self> {
                 $( let mut $field = frame.read::<$ty>(stringify!($field))?.into_iter(); )+
                 let mut rows = Vec::with_capacity(frame.rows());
                 for _ in 0..frame.rows() {
@@ -65,23 +60,27 @@ macro_rules! rows {
         }
     };
 }
-pub(crate) use rows;
+include!(concat!(env!("OUT_DIR"), "/columns.rs"));
+
+/// Declares every table kind, in the order of their names; one without `of` has columns for each joint and is written by hand.
+macro_rules! tables {
+    ($( $kind:ident => $table:ident $(of $row:ident)?, )+) => {
+        $( $( $kind! { $table, $row } )? )+
+        /// Every table kind; `schemas/<kind>.json` holds its schema.
+        pub const TABLES: &[&str] = &[$( $table::KIND, )+];
+    };
+}
 
 mod body_consistency;
-mod changes;
 mod contacts;
 mod convention;
 mod corrections;
 mod covariance;
-mod curves;
-mod document;
 mod findings;
 mod fit;
-mod fleet;
 mod forms;
 mod friction_curves;
 mod inertials;
-mod intake;
 mod joint_torques;
 mod located;
 mod motion;
@@ -91,10 +90,7 @@ mod parameters;
 mod point;
 mod prediction;
 mod recording;
-mod rejected;
 mod robot;
-mod scoreboard;
-mod searches;
 mod split;
 mod standing;
 mod statistics;
@@ -104,97 +100,67 @@ mod torque_course;
 mod torque_findings;
 mod torque_parameters;
 mod torque_verdict;
-mod training;
-mod truth;
 mod verdict;
+mod verdict_sentences;
 
-pub use body_consistency::{BodyConsistencies, BodyConsistencyRow};
-pub use changes::{ChangeRow, Changes};
-pub use contacts::{ContactRow, Contacts};
-pub use convention::{JointConventionRow, JointConventions};
-pub use corrections::{Corrections, CorrectionsRow};
-pub use covariance::{CovarianceRow, CovarianceTable};
-pub use curves::{CurveRow, Curves};
-pub use document::{Document, DocumentRow};
-pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals, is_separable_by_poses};
-pub use fit::{Fit, FitRow};
-pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
-pub use forms::{FormRow, Forms, formula_in_words};
-pub use friction_curves::{FrictionCurveRow, FrictionCurves};
-pub use inertials::{InertialRow, Inertials};
-pub use intake::{Intake, IntakeRow};
-pub use joint_torques::{JointTorqueRow, JointTorques};
-pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
+pub use findings::is_separable_by_poses;
+pub use forms::formula_in_words;
 pub use motion::ArmMotion;
-pub use network::{Network, NetworkRow};
-pub use observability::{FitContext, Observability, ObservabilityRow, UNFOLDED};
-pub use parameters::{Corrected, ParameterRow, Parameters};
-pub use prediction::{Prediction, PredictionRow};
+pub use observability::{FitContext, UNFOLDED};
+pub use parameters::Corrected;
 pub use recording::{Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame};
-pub use rejected::{Rejected, RejectedRow};
-pub use robot::{Robot, RobotRow};
-pub use scoreboard::{Scoreboard, ScoreboardRow};
-pub use searches::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
-pub use split::{Split, SplitRow};
 pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
-pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
-pub use suspects::{Suspects, SuspectsRow};
-pub use torque_changes::{TorqueChangeRow, TorqueChangeTable};
 pub use torque_course::TorqueCourse;
-pub use torque_findings::{TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals};
-pub use torque_parameters::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorqueParameters};
-pub use torque_verdict::{TorqueVerdict, TorqueVerdictRow};
-pub use training::{Training, TrainingRow};
-pub use truth::{Truth, TruthRow};
-pub use verdict::{Verdict, VerdictRow};
+pub use verdict_sentences::VerdictTopic;
 
-/// Every table kind; `schemas/<kind>.json` holds its schema.
-pub const TABLES: &[&str] = &[
-    BodyConsistencies::KIND,
-    Changes::KIND,
-    Contacts::KIND,
-    JointConventions::KIND,
-    Corrections::KIND,
-    CovarianceTable::KIND,
-    Curves::KIND,
-    Document::KIND,
-    FindingNumbers::KIND,
-    Findings::KIND,
-    Fit::KIND,
-    FleetTable::KIND,
-    FleetChanges::KIND,
-    Forms::KIND,
-    FrictionCurves::KIND,
-    Inertials::KIND,
-    Intake::KIND,
-    JointTorques::KIND,
-    ArmMotion::KIND,
-    Network::KIND,
-    Observability::KIND,
-    Parameters::KIND,
-    Prediction::KIND,
-    Recording::KIND,
-    Rejected::KIND,
-    Rivals::KIND,
-    Robot::KIND,
-    Scoreboard::KIND,
-    SearchCourse::KIND,
-    Searches::KIND,
-    Shares::KIND,
-    Spectrum::KIND,
-    Split::KIND,
-    Statistics::KIND,
-    Suspects::KIND,
-    TorqueChangeTable::KIND,
-    TorqueCourse::KIND,
-    TorqueCovariance::KIND,
-    TorqueFindings::KIND,
-    TorqueNumbers::KIND,
-    TorqueParameters::KIND,
-    TorqueRivals::KIND,
-    TorqueVerdict::KIND,
-    Training::KIND,
-    Truth::KIND,
-    Verdict::KIND,
-];
+tables! {
+    acceptance => Acceptance of AcceptanceRow,
+    body_consistency => BodyConsistencies of BodyConsistencyRow,
+    changes => Changes of ChangeRow,
+    contacts => Contacts of ContactRow,
+    convention => JointConventions of JointConventionRow,
+    corrections => Corrections of CorrectionsRow,
+    covariance => CovarianceTable of CovarianceRow,
+    curves => Curves of CurveRow,
+    document => Document of DocumentRow,
+    finding_numbers => FindingNumbers of FindingNumberRow,
+    findings => Findings of FindingRow,
+    fit => Fit of FitRow,
+    fleet => FleetTable of FleetRow,
+    fleet_changes => FleetChanges of FleetChangeRow,
+    forms => Forms of FormRow,
+    friction_curves => FrictionCurves of FrictionCurveRow,
+    inertials => Inertials of InertialRow,
+    intake => Intake of IntakeRow,
+    joint_torques => JointTorques of JointTorqueRow,
+    motion => ArmMotion,
+    network => Network of NetworkRow,
+    observability => Observability of ObservabilityRow,
+    parameters => Parameters of ParameterRow,
+    prediction => Prediction of PredictionRow,
+    recording => Recording,
+    rejected => Rejected of RejectedRow,
+    rivals => Rivals of RivalRow,
+    robot => Robot of RobotRow,
+    scoreboard => Scoreboard of ScoreboardRow,
+    search_course => SearchCourse of SearchCourseRow,
+    searches => Searches of SearchesRow,
+    shares => Shares of ShareRow,
+    spectrum => Spectrum of SpectrumRow,
+    split => Split of SplitRow,
+    statistics => Statistics of StatisticsRow,
+    suspects => Suspects of SuspectsRow,
+    torque_changes => TorqueChangeTable of TorqueChangeRow,
+    torque_course => TorqueCourse,
+    torque_covariance => TorqueCovariance of TorqueCovarianceRow,
+    torque_findings => TorqueFindings of TorqueFindingRow,
+    torque_numbers => TorqueNumbers of TorqueNumberRow,
+    torque_parameters => TorqueParameters of TorqueParameterRow,
+    torque_rivals => TorqueRivals of TorqueRivalRow,
+    torque_verdict => TorqueVerdict of TorqueVerdictRow,
+    training => Training of TrainingRow,
+    truth => Truth of TruthRow,
+    verdict => Verdict of VerdictRow,
+    verdict_sentences => VerdictSentences of VerdictSentenceRow,
+}

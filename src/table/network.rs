@@ -1,5 +1,7 @@
 //! A learned correction of any kind (networks, a Gaussian process, or linear terms), its scaling, inputs and valid region.
 
+use super::{Network, NetworkRow};
+
 mod numbers;
 mod reading;
 
@@ -9,24 +11,6 @@ use crate::estimate::network::correction::{Body, Correction, Feature, Map, Netwo
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::region::Region;
 use crate::estimate::network::{Activation, LayerSizes};
-
-crate::table::rows! { "network",
-    /// Numbers of the learned correction, one a row; key (`member`, `part`, `layer`, `to`, `from`). No rows: no correction.
-    ///
-    /// To apply it: [`Network::correction`], then [`Correction::at`]. Joints and payload are sources: joint `j` is `j`, the payload
-    /// one more than the number of joints.
-    pub struct Network of NetworkRow {
-        /// The network, or the set of coefficients, from 1; 0 for what all share.
-        member: i64,
-        /// Which array; see the schema.
-        part: String,
-        layer: i64,
-        to: i64,
-        from: i64,
-        /// Dimensionless for weights and biases; else in the unit of what it scales: mm, rad or kg.
-        value: f64,
-    }
-}
 
 /// mm per m.
 const MILLI: f64 = 1e3;

@@ -1,35 +1,6 @@
 //! The identified model: every parameter by name, with its status.
 
-crate::table::rows! { "parameters",
-    /// Parameters, one a row; key `name`. Values are in the row's own `unit`.
-    pub struct Parameters of ParameterRow {
-        /// E.g. `reduction_ratio.j2`, `link_geometry.l3.x`.
-        name: String,
-        /// Canonical effect name, e.g. `reduction_ratio`.
-        effect: String,
-        /// E.g. `joint 2`, `link 3`, `base`, `tool`.
-        place: String,
-        unit: String,
-        nominal: f64,
-        value: f64,
-        /// Value minus nominal.
-        change: f64,
-        /// One standard deviation; null where it was not estimated.
-        sigma: Option<f64>,
-        /// `free` (estimated), `bound` (estimated, and stopped by its bound), `earlier` (estimated by an earlier step), `held` (by the
-        /// user), `redundant` (other free parameters do the same), `unseen` (the data do not see it).
-        status: String,
-        /// The step that set the value.
-        step: String,
-        /// Why it was not estimated, or what it is confounded with.
-        remark: Option<String>,
-        /// The effect's place and shape as JSON, for effects that a diagnosis added; null for effects of the whole arm.
-        form: Option<String>,
-        /// `outside_simulation` where the parameters say nothing of the robot file; else null.
-        corrects: Option<String>,
-    }
-}
-
+use super::{ParameterRow, Parameters};
 use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, names, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
@@ -245,7 +216,7 @@ impl Parameters {
         let targets = self.placed(names::TOOL_OFFSET);
         if targets.keys().any(|name| !name.is_empty()) || turned("") {
             let target = |(name, stand): (String, Pose)| Target {
-                seat: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
+                mounting: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
                 oriented: turned(&name),
                 name,
             };

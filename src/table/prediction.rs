@@ -1,49 +1,6 @@
 //! Where a model puts every measured point, and what is left.
 
-crate::table::rows! { "prediction",
-    /// Points, one a row; key `sequence`. Residual = measured - predicted, tracker frame.
-    pub struct Prediction of PredictionRow {
-        sequence: i64,
-        point_id: String,
-        set: String,
-        /// The step whose model this is, e.g. `nominal`, `geometry`.
-        step: String,
-        /// True where neither this step nor an earlier one was fitted to this row, nor looked at it to set it aside.
-        held_out: bool,
-        /// True where the screen of this step took the row for a mistake of the recording.
-        suspect: bool,
-        x_mm: f64,
-        y_mm: f64,
-        z_mm: f64,
-        dx_mm: f64,
-        dy_mm: f64,
-        dz_mm: f64,
-        /// Length of the residual; where the row's socket, plane or sphere is placed by held-out rows alone, as if this one had no part.
-        error_mm: f64,
-        /// One-sigma length of the measurement noise that the row is weighted by (root of the summed variances).
-        noise_mm: f64,
-        /// What `noise_mm` rests on: `repeats`, `instrument` or `inferred`; null in tables of before.
-        noise_basis: Option<String>,
-        /// One-sigma length of the predicted position's uncertainty from the parameters'; null where this step does not know it.
-        sigma_mm: Option<f64>,
-        /// Length of the residual under a fit of this step without the row's fold, folds drawn at random by pose; null where the step
-        /// was not fitted to the row, or made no folds.
-        fold_error_mm: Option<f64>,
-        /// The same with contiguous stretches of the recording as folds.
-        block_error_mm: Option<f64>,
-        /// Huber's weight in the fit of this step: 1 of a row that counts in full, 0 of one set aside; null where the step was not fitted
-        /// to the row.
-        weight: Option<f64>,
-        /// What was measured, where it was not a whole point: its axes, e.g. `z`, `rotation`, `distance`. Residual and error then are
-        /// those of the axes, or else of the distance.
-        measured: Option<String>,
-        /// Angle between what was measured and predicted of the orientation; null where nothing was.
-        turn_rad: Option<f64>,
-        /// What of the row lies outside of where the model was measured, or is uncertain; null elsewhere, or where that is not known.
-        remark: Option<String>,
-    }
-}
-
+use super::{Prediction, PredictionRow};
 use crate::estimate::{Covariance, Fitted, Model};
 use crate::observation::{KINDS, noise};
 use crate::robot::Measurements;

@@ -1,28 +1,6 @@
 //! Rows that no smooth model can follow, by name and kind: set aside, and never silently dropped.
 
-crate::table::rows! { "suspects",
-    /// Suspects, one a row; key `sequence`.
-    pub struct Suspects of SuspectsRow {
-        sequence: i64,
-        point_id: String,
-        set: String,
-        /// The step whose model the row was held against.
-        step: String,
-        /// `exchanged`, `mislabelled`, `shifted_block`, `unit_slip`, `zero`, `outlier`, or `event`.
-        kind: String,
-        /// The row whose joints this row's point belongs to.
-        partner_sequence: Option<i64>,
-        /// Distance of the measured from the predicted point.
-        size_mm: f64,
-        /// The same with the row left out of the fit, in standard deviations of the rows of its set.
-        statistic: f64,
-        /// True where the row takes part in the fit all the same.
-        used: bool,
-        /// The sentence for a person.
-        remark: String,
-    }
-}
-
+use super::{Suspects, SuspectsRow};
 use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::table::{Recording, Split};
 

@@ -1,25 +1,7 @@
 //! What changed between two recordings of an arm's torques.
 
+use super::{TorqueChangeRow, TorqueChangeTable};
 use crate::dynamics::TorqueChanges;
-
-crate::table::rows! { "torque_changes",
-    /// Numbers that may have changed, one a row; key `name`.
-    pub struct TorqueChangeTable of TorqueChangeRow {
-        name: String,
-        effect: String,
-        place: String,
-        unit: String,
-        /// In the earlier model; null where it has no such number.
-        previous: Option<f64>,
-        change: f64,
-        /// One standard deviation.
-        sigma: f64,
-        p_value: f64,
-        probability: f64,
-        /// Null where it is held to be unchanged.
-        rank: Option<i64>,
-    }
-}
 
 impl TorqueChangeTable {
     /// Of a comparison; `previous` gives a number of the earlier model by name.

@@ -1,50 +1,7 @@
 //! What a diagnosis of torques found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
 
+use super::{TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals};
 use crate::dynamics::{TorqueDiagnosis, TorqueFinding};
-
-crate::table::rows! { "torque_findings",
-    /// Findings, strongest first; key `rank`.
-    pub struct TorqueFindings of TorqueFindingRow {
-        /// From 1.
-        rank: i64,
-        effect: String,
-        place: String,
-        /// One sentence for a person.
-        statement: String,
-        gain: f64,
-        f_statistic: f64,
-        p_value: f64,
-        delta_bic: f64,
-        heldout_gain_nm: Option<f64>,
-        effect_rms_nm: f64,
-        probability: f64,
-        place_probability: f64,
-        none_probability: f64,
-    }
-}
-
-crate::table::rows! { "torque_numbers",
-    /// Numbers of findings; key (`rank`, `name`).
-    pub struct TorqueNumbers of TorqueNumberRow {
-        rank: i64,
-        name: String,
-        value: f64,
-        unit: String,
-        /// One standard deviation.
-        sigma: Option<f64>,
-    }
-}
-
-crate::table::rows! { "torque_rivals",
-    /// Explanations that these data cannot separate from a finding; key (`rank`, `effect`, `place`).
-    pub struct TorqueRivals of TorqueRivalRow {
-        rank: i64,
-        effect: String,
-        place: String,
-        delta_bic: f64,
-        probability: f64,
-    }
-}
 
 fn ranked(diagnosis: &TorqueDiagnosis) -> impl Iterator<Item = (i64, &TorqueFinding)> {
     (1..).zip(&diagnosis.findings)

@@ -1,39 +1,11 @@
 //! The identified model of torques: one table from which it is made again, and its covariance.
 
+use super::{TorqueCovariance, TorqueCovarianceRow, TorqueParameterRow, TorqueParameters};
 use crate::dynamics::{COULOMB, INERTIAL_NAMES, INERTIAL_NUMBERS, JointRange, TorqueModel, TorqueTerm};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-crate::table::rows! { "torque_parameters",
-    /// Numbers of the model, one a row; key `name`.
-    pub struct TorqueParameters of TorqueParameterRow {
-        name: String,
-        /// `rigid_body`, the name of a cause, or `recording`.
-        effect: String,
-        place: String,
-        quantity: String,
-        value: f64,
-        unit: String,
-        /// One standard deviation.
-        sigma: Option<f64>,
-        /// Of the whole cause.
-        rms_nm: Option<f64>,
-        /// JSON.
-        form: Option<String>,
-    }
-}
-
-crate::table::rows! { "torque_covariance",
-    /// Pairs of estimated numbers, each once; key (`parameter`, `other`), with `parameter` not after `other` in the alphabet.
-    pub struct TorqueCovariance of TorqueCovarianceRow {
-        parameter: String,
-        other: String,
-        covariance: f64,
-        correlation: f64,
-    }
-}
 
 /// What a cause has besides its coefficients.
 #[derive(Serialize, Deserialize)]

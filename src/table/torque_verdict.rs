@@ -1,31 +1,8 @@
 //! The verdict of a diagnosis of torques, with errors before and after.
 
+use super::{TorqueVerdict, TorqueVerdictRow};
 use crate::diagnose::VerdictKind;
 use crate::dynamics::{InertialBasis, TorqueDiagnosis};
-
-crate::table::rows! { "torque_verdict",
-    /// One row a diagnosis; key `step`.
-    pub struct TorqueVerdict of TorqueVerdictRow {
-        step: String,
-        verdict: String,
-        statement: String,
-        /// `declared` or `free`.
-        inertials: String,
-        base_parameters: Option<i64>,
-        /// `current` or `torque`.
-        signal: String,
-        cutoff_hz: f64,
-        rate_hz: f64,
-        rows: i64,
-        held_out: bool,
-        before_nrmse: f64,
-        after_nrmse: f64,
-        /// One sentence a line.
-        not_observable: String,
-        withdrawn: Option<String>,
-        remarks: Option<String>,
-    }
-}
 
 impl TorqueVerdictRow {
     /// Whether files and robot do not belong together as they are read.
@@ -37,7 +14,6 @@ impl TorqueVerdictRow {
 impl TorqueVerdict {
     /// The verdict of the stage `step`; `from_current` where motor currents were recorded.
     pub fn of(step: &str, diagnosis: &TorqueDiagnosis, from_current: bool) -> Self {
-        let lines = |all: &[String]| (!all.is_empty()).then(|| all.join("\n"));
         let (inertials, base_parameters) = match diagnosis.basis {
             InertialBasis::Declared => ("declared", None),
             InertialBasis::Free(count) => ("free", Some(count as i64)),
@@ -55,9 +31,6 @@ impl TorqueVerdict {
             held_out: diagnosis.held_out,
             before_nrmse: diagnosis.before.nrmse_mean,
             after_nrmse: diagnosis.after.nrmse_mean,
-            not_observable: diagnosis.not_observable.join("\n"),
-            withdrawn: lines(&diagnosis.withdrawn),
-            remarks: lines(&diagnosis.remarks),
         }])
     }
 }

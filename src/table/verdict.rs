@@ -1,57 +1,7 @@
 //! The verdict of a diagnosis, with errors before and after.
 
-crate::table::rows! { "verdict",
-    /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects among them.
-    pub struct Verdict of VerdictRow {
-        step: String,
-        /// `explained`, `nothing_missing`, `unexplained`, `not_asked` of too few rows, or `wrong_setup`.
-        verdict: String,
-        /// The same in a sentence, with what its noise rests on.
-        statement: Option<String>,
-        /// `repeats`, `instrument` or `inferred`.
-        noise_basis: Option<String>,
-        /// Rms length of the noise of these rows: instrument and joint repeatability.
-        noise_floor_mm: Option<f64>,
-        /// Whether the errors are of rows that no model has seen.
-        held_out: bool,
-        before_mean_mm: Option<f64>,
-        before_rms_mm: Option<f64>,
-        before_max_mm: Option<f64>,
-        after_mean_mm: Option<f64>,
-        after_rms_mm: Option<f64>,
-        after_max_mm: Option<f64>,
-        /// Rms length of what is left at fitted rows.
-        leftover_rms_mm: Option<f64>,
-        /// The same figures where the rows to fit measured angles and no length.
-        noise_floor_rad: Option<f64>,
-        before_rms_rad: Option<f64>,
-        after_rms_rad: Option<f64>,
-        leftover_rms_rad: Option<f64>,
-        /// Squared whitened residual per degree of freedom.
-        chi_square: f64,
-        /// Probability that what the base model leaves, and what is left in the end, is noise; null where it was not asked.
-        p_before: Option<f64>,
-        p_after: Option<f64>,
-        /// Standard deviation of every joint from move to move.
-        repeatability_rad: f64,
-        /// Repeats of a target in a pose that it rests on.
-        repeats: i64,
-        /// Rows that were fitted.
-        points: i64,
-        /// What these data cannot show, one sentence a line.
-        not_observable: String,
-        /// What is left looks like, where it is not noise.
-        signature: Option<String>,
-        /// What to measure next, one sentence a line.
-        next_measurements: Option<String>,
-        /// Findings that the fit of the whole model left without size or made worse, one sentence a line.
-        withdrawn: Option<String>,
-        /// What counts time in statements and in the forms of findings: `s`, or `row` of the recording where it has no clock.
-        clock: Option<String>,
-    }
-}
-
 use super::Findings;
+use super::{Verdict, VerdictRow};
 use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};
 use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
@@ -112,10 +62,7 @@ impl Verdict {
             repeatability_rad: diagnosis.repeatability.sigma,
             repeats: diagnosis.repeatability.repeats as i64,
             points: diagnosis.kept.len() as i64,
-            not_observable: diagnosis.not_observable.join("\n"),
             signature: diagnosis.signature.clone(),
-            next_measurements: (!diagnosis.next_measurements.is_empty()).then(|| diagnosis.next_measurements.join("\n")),
-            withdrawn: (!diagnosis.withdrawn.is_empty()).then(|| diagnosis.withdrawn.join("\n")),
             clock: Some(if diagnosis.clock { "s" } else { "row" }.into()),
         }])
     }

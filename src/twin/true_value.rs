@@ -27,3 +27,14 @@ pub(crate) fn true_value(
     let dot = if number.is_empty() { "" } else { "." };
     TrueValue { name: format!("{effect}.{tag}{dot}{number}"), effect, place, unit, value }
 }
+
+/// Numbers of the effect `effect` at `place`: name, unit and value of each.
+pub(crate) fn true_values<N: AsRef<str>>(
+    effect: &'static str,
+    tag: &str,
+    place: &str,
+    numbers: impl IntoIterator<Item = (N, &'static str, f64)>,
+) -> Vec<TrueValue> {
+    let value = |(number, unit, value): (N, _, _)| true_value(effect, tag, place.into(), number.as_ref(), unit, value);
+    numbers.into_iter().map(value).collect()
+}

@@ -115,7 +115,7 @@ impl Case {
 fn model(robot: &RobotModel, base: Pose, effects: &[String]) -> Model {
     let setting = EffectContext { base, load: Load::GravityTorque };
     let chosen = identified().filter(|cause| effects.iter().any(|name| name == cause.name()));
-    Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.filter_map(|cause| cause.whole(&setting)).collect()))
+    Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.filter_map(|cause| cause.arm_effect(&setting)).collect()))
 }
 
 fn numbers(value: &Value) -> Vec<f64> {

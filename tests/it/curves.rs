@@ -104,6 +104,7 @@ fn curves_of(
         corrections: Vec::new(),
         models: labelled(parameters),
         verdict: Vec::new(),
+        sentences: Vec::new(),
         findings: labelled(Findings(findings)),
         finding_numbers: Vec::new(),
         rivals: Vec::new(),

@@ -24,7 +24,7 @@ fn data(robot: &RobotModel, rows: usize) -> Measurements {
 }
 
 fn all_effects(load: Load) -> Vec<Box<dyn Effect>> {
-    identified().filter_map(|cause| cause.whole(&setting(load))).collect()
+    identified().filter_map(|cause| cause.arm_effect(&setting(load))).collect()
 }
 
 /// A plausible value of each parameter, of either sign: a hundredth of its prior sigma, and a stiff gear for compliances.

@@ -312,7 +312,7 @@ fn every_cause_is_listed_once_and_described() {
         let about = cause.about();
         assert!(seen.insert(about.name), "{} is listed twice", about.name);
         assert!([about.place, about.formula, about.size, about.confounded, about.needs].iter().all(|words| !words.is_empty()));
-        if let Some(effect) = cause.whole(&setting()) {
+        if let Some(effect) = cause.arm_effect(&setting()) {
             assert_eq!(effect.name(), about.name);
         }
     }

@@ -33,7 +33,7 @@ impl Cell {
         let home = *robot.home();
         let target = |(name, offset): &(&str, [f64; 3])| Target {
             name: (*name).into(),
-            seat: Pose::new(home.rotation, home.point(&(Vector3::from(*offset) * 1e-3))),
+            mounting: Pose::new(home.rotation, home.point(&(Vector3::from(*offset) * 1e-3))),
             oriented: false,
         };
         let setup = MeasurementSetup { targets: targets.iter().map(target).collect(), anchors: Vec::new() };
@@ -81,7 +81,7 @@ impl Cell {
     fn turns(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
         let moved = |axis: usize| {
             let mut setup = self.truth.robot.setup().clone();
-            setup.targets.iter_mut().for_each(|target| target.seat.translation[axis] += 0.5);
+            setup.targets.iter_mut().for_each(|target| target.mounting.translation[axis] += 0.5);
             Model { robot: self.truth.robot.clone().measured_by(setup), ..self.truth.clone() }.predict(data)
         };
         let (own, beside) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);

@@ -108,8 +108,8 @@ macro_rules! kinds {
         }
     };
 }
-kinds! { BodyConsistencies Changes Contacts JointConventions Corrections CovarianceTable Curves Document FindingNumbers Findings Fit FleetTable FleetChanges Forms FrictionCurves Inertials Intake JointTorques ArmMotion Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
-Statistics Suspects TorqueChangeTable TorqueCourse TorqueCovariance TorqueFindings TorqueNumbers TorqueParameters TorqueRivals TorqueVerdict Training Truth Verdict }
+kinds! { Acceptance BodyConsistencies Changes Contacts JointConventions Corrections CovarianceTable Curves Document FindingNumbers Findings Fit FleetTable FleetChanges Forms FrictionCurves Inertials Intake JointTorques ArmMotion Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
+Statistics Suspects TorqueChangeTable TorqueCourse TorqueCovariance TorqueFindings TorqueNumbers TorqueParameters TorqueRivals TorqueVerdict Training Truth Verdict VerdictSentences }
 
 #[test]
 fn every_table_is_tested_and_has_exactly_one_schema() {

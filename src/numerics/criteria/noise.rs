@@ -5,11 +5,11 @@ use super::table::criteria;
 
 criteria! {
     "noise";
-    /// A residual this much larger than the noise, in mean square, does not agree with it: where it has structure it is not
-    /// explained ...
-    LOUD: f64 = 1.25, "ratio of squares", "judgement: more than a stated sigma is off by", "changes nothing on 2";
-    /// ... and this much larger it is not whatever it looks like.
-    TOO_LOUD: f64 = 2.5, "ratio of squares", "judgement: no stated sigma is off by 60 %", "changes nothing on 2";
+    /// A residual that is larger than the noise by this factor, in mean square, does not agree with it: where it has structure it is
+    /// not explained.
+    MAX_CHI_SQUARE_OF_STRUCTURE: f64 = 1.25, "ratio of squares", "judgement: more than a stated sigma is off by", "changes nothing on 2";
+    /// A residual that is larger than the noise by this factor, in mean square, is not explained, whatever it looks like.
+    MAX_CHI_SQUARE: f64 = 2.5, "ratio of squares", "judgement: no stated sigma is off by 60 %", "changes nothing on 2";
     /// Repeats that make the noise known; with fewer it is taken from a residual without structure.
     REPEATS: usize = 10, "repeats", "count: a standard deviation known to a quarter", "";
     /// Fewer repeats than this say too little.

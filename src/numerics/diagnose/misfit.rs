@@ -2,7 +2,7 @@
 
 use super::types::Question;
 use super::words::Ground;
-use crate::criteria::noise::{LOUD, TOO_LOUD};
+use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE};
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_brought};
@@ -81,7 +81,7 @@ impl Misfit {
         let freedom = values(kept).saturating_sub(parameters).max(1) as f64;
         // Rows that were not fitted also see the errors of what was.
         let inflation = 1.0 + parameters as f64 / freedom;
-        let not_carried = held_out && whitened(&judges) > *TOO_LOUD * inflation * values(&judges) as f64;
+        let not_carried = held_out && whitened(&judges) > *MAX_CHI_SQUARE * inflation * values(&judges) as f64;
         let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
         let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();
@@ -114,7 +114,7 @@ impl Misfit {
     pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize, nameless: bool) -> Ground {
         Ground {
             dimension: self.dimension,
-            agrees: self.chi_square <= *LOUD,
+            agrees: self.chi_square <= *MAX_CHI_SQUARE_OF_STRUCTURE,
             not_carried: self.not_carried,
             nameless,
             partly_nameless: false,

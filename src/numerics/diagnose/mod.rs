@@ -30,7 +30,7 @@ mod words;
 
 pub use outside::against_simulation;
 pub use round::BASE;
-pub use separate::{DiagnosedModel, contest};
+pub use separate::{DiagnosedModel, discrimination_problem};
 pub use setup::wrong_setup;
 pub use types::{
     ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question,

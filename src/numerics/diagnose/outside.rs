@@ -16,7 +16,7 @@ pub fn against_simulation(
     rows: &[usize],
 ) -> Option<Measurements> {
     let there = |row: &usize| simulated.get(*row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()));
-    let used: Vec<usize> = rows.iter().copied().filter(|row| there(row) && data.whole(*row)).collect();
+    let used: Vec<usize> = rows.iter().copied().filter(|row| there(row) && data.has_point(*row)).collect();
     if used.len() < 3 {
         return None;
     }
@@ -30,7 +30,7 @@ pub fn against_simulation(
     out.readings.clear();
     for row in 0..data.rows() {
         if there(&row) {
-            let seat = robot.seat(robot.setup().target(data.target(row)));
+            let seat = robot.mounting(robot.setup().target(data.target(row)));
             let rigid = (robot.last_body(data.q(row)) * *seat).translation;
             out.points.shift(row, base.point(&rigid) - frame.point(&point(row)));
         } else {

@@ -9,7 +9,7 @@ use crate::effect::{
     hypotheses, whole,
 };
 use crate::estimate::Model;
-use crate::estimate::choose::{Alternative, Contest};
+use crate::estimate::choose::{Alternative, DiscriminationProblem};
 use crate::robot::Measurements;
 use std::collections::BTreeSet;
 
@@ -27,7 +27,11 @@ pub struct DiagnosedModel<'a> {
 
 /// The finding of these forms beside the rival `effect` at `place`: of its forms the one that fits
 /// best in its place, and as it fits there. Fails with a sentence where the recording knows no such rival.
-pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&str, Place)) -> Result<(Contest, Form), String> {
+pub fn discrimination_problem(
+    diagnosed: &DiagnosedModel,
+    finding: &[Form],
+    (effect, place): (&str, Place),
+) -> Result<(DiscriminationProblem, Form), String> {
     let DiagnosedModel { model, data, rows, free } = *diagnosed;
     let problem = WhitenedProblem::new(model, data, rows.to_vec());
     let (torque, compliance) = (problem.torques(), compliance(model));
@@ -61,10 +65,10 @@ pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&
     let rival = &pool.hypotheses[best];
     let both = with(model, &rival.form);
     let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
-    let theirs: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
+    let of_rival: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
     let sizes = own.iter().map(|k| model.x[*k]).collect();
-    let sides = [Alternative { parameters: own, sizes }, Alternative { parameters: theirs, sizes: fitted }];
-    Ok((Contest { model: both, nuisances, sides }, rival.form.clone()))
+    let sides = [Alternative { parameters: own, sizes }, Alternative { parameters: of_rival, sizes: fitted }];
+    Ok((DiscriminationProblem { model: both, nuisances, sides }, rival.form.clone()))
 }
 
 /// How well one form fits, with a penalty for every parameter.

@@ -42,7 +42,7 @@ impl<'a> CauseChoice<'a> {
     pub fn worth(&self, sweep: &SweptColumns, number: usize) -> f64 {
         let gain = sweep.gain(number);
         let form = self.form(number);
-        if form.cause.is_positive() && !sweep.rises(number) {
+        if form.cause.about().positive && !sweep.rises(number) {
             return f64::NEG_INFINITY;
         }
         let worth = gain.square - self.penalty(number, gain.rank.max(1));
@@ -64,7 +64,7 @@ impl<'a> CauseChoice<'a> {
         if !form.cause.is_itself(form, &self.problem.scene) || !form.cause.is_possible(form, &whole) {
             return true;
         }
-        self.form(number).cause.is_positive() && values().any(|value| value <= -NEARLY_ZERO * largest)
+        self.form(number).cause.about().positive && values().any(|value| value <= -NEARLY_ZERO * largest)
     }
 
     /// Criterion of a set: whitened squared residual, tolerances stretched, and penalties.
@@ -84,7 +84,8 @@ impl<'a> CauseChoice<'a> {
         let form = self.form(number);
         let taken = |other: &usize| {
             let other_form = self.form(*other);
-            *other == number || (form.is_called_as(other_form) && (!form.cause.may_repeat() || form.with == other_form.with))
+            *other == number
+                || (form.is_called_as(other_form) && (!form.cause.about().may_repeat || form.with == other_form.with))
         };
         !set.iter().any(taken) && self.has_what_it_modifies(number, set)
     }
@@ -95,7 +96,7 @@ impl<'a> CauseChoice<'a> {
         let has = |name: &&str| {
             set.iter().any(|other| self.form(*other).cause.name() == *name && self.form(*other).place == form.place)
         };
-        form.cause.modifies().iter().all(has)
+        form.cause.about().modifies.iter().all(has)
     }
 
     /// Whether all of a set have what they modify.
@@ -112,7 +113,7 @@ impl<'a> CauseChoice<'a> {
     /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
     pub fn compete(&self, a: usize, b: usize) -> bool {
         let (a, b) = (self.form(a), self.form(b));
-        a.place == b.place || (a.cause.is_inertial() && b.cause.is_inertial())
+        a.place == b.place || (a.cause.about().inertial && b.cause.about().inertial)
     }
 }
 

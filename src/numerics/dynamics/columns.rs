@@ -55,7 +55,7 @@ impl TorqueColumns {
     /// Takes another form; its number.
     pub fn push(&mut self, form: TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> usize {
         let known = self.forms.iter().position(|known| {
-            form.cause.is_alike_at_joints() && known.cause.name() == form.cause.name() && known.with == form.with
+            form.cause.about().alike_at_joints && known.cause.name() == form.cause.name() && known.with == form.with
         });
         let columns = match known {
             Some(known) => {
@@ -73,7 +73,7 @@ impl TorqueColumns {
     /// Columns of forms that are made of the rigid torque, anew.
     pub fn renew(&mut self, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
         for number in 0..self.forms.len() {
-            if self.forms[number].cause.is_of_rigid() {
+            if self.forms[number].cause.about().of_rigid {
                 let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
                 let range = self.of(number);
                 self.columns[range].clone_from_slice(&fresh);
@@ -85,7 +85,7 @@ impl TorqueColumns {
     pub fn renew_signs(&mut self, set: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
         let used = |number: &usize| *number < self.listed || set.contains(number);
         for number in
-            (0..self.forms.len()).filter(used).filter(|number| self.forms[*number].cause.is_of_sign()).collect::<Vec<_>>()
+            (0..self.forms.len()).filter(used).filter(|number| self.forms[*number].cause.about().of_sign).collect::<Vec<_>>()
         {
             let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
             let range = self.of(number);

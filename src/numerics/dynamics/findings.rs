@@ -54,7 +54,7 @@ fn finding(
         effect.iter().filter(|course| course.iter().any(|value| *value != 0.0)).count().max(1) * problem.reduction.rows.len();
     let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
     // Tolerances bend to take the place of a wrong mass, at their price: its size is what the rest leaves as it is.
-    let left_without: Vec<(usize, f64)> = match form.cause.is_inertial() {
+    let left_without: Vec<(usize, f64)> = match form.cause.about().inertial {
         true => solution.iter().copied().filter(|(column, _)| !problem.all.of(number).contains(column)).collect(),
         false => without.solution(),
     };

@@ -72,5 +72,5 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
 
 /// Whether one form modifies the friction that another is.
 fn modifies(form: &TorqueForm, friction: &TorqueForm) -> bool {
-    form.place == friction.place && form.cause.modifies().contains(&friction.cause.name())
+    form.place == friction.place && form.cause.about().modifies.contains(&friction.cause.name())
 }

@@ -89,7 +89,7 @@ pub(super) fn absorb(choice: &CauseChoice, set: &[usize], solution: &[(usize, f6
         let (place, joint) = (choice.form(unnamed).place, choice.form(unnamed).joint());
         for curve in set.iter().copied() {
             let form = choice.form(curve);
-            if form.place != place || !form.cause.is_of_angle() {
+            if form.place != place || !form.cause.about().of_angle {
                 continue;
             }
             let [one, other, both] = [vec![unnamed], vec![curve], vec![unnamed, curve]].map(|numbers| torque(&numbers, joint));
@@ -109,7 +109,7 @@ pub(super) fn absorb_drag(choice: &CauseChoice, set: &[usize], uncertain: &Swept
     let value = |column: usize| solution.iter().find(|(pivot, _)| *pivot == column).map_or(0.0, |(_, value)| *value);
     let is_drag = |number: &&usize| {
         let cause = choice.form(**number).cause;
-        cause.name() == UNKNOWN && cause.modifies() == [COULOMB]
+        cause.name() == UNKNOWN && cause.about().modifies == [COULOMB]
     };
     for drag in set.iter().filter(is_drag) {
         let place = choice.form(*drag).place;
@@ -139,7 +139,7 @@ fn usual_shape(residual: &[Vec<f64>], runs: &[Range<usize>]) -> f64 {
 
 /// Whether a name is of neither viscous nor Coulomb friction, which nearly every joint has, nor of a wrong mass.
 fn is_judged(effect: &str) -> bool {
-    let is_inertial = TORQUE_CAUSES.iter().any(|cause| cause.name() == effect && cause.is_inertial());
+    let is_inertial = TORQUE_CAUSES.iter().any(|cause| cause.name() == effect && cause.about().inertial);
     ![VISCOUS, COULOMB, UNKNOWN].contains(&effect) && !is_inertial
 }
 

@@ -62,7 +62,7 @@ fn has_shapes(choice: &CauseChoice, number: usize) -> bool {
 /// Whether one form may stand for another as the same finding.
 fn is_another_shape(choice: &CauseChoice, other: usize, number: usize) -> bool {
     let [form, known] = [other, number].map(|number| choice.form(number));
-    form.is_called_as(known) && !form.cause.may_repeat()
+    form.is_called_as(known) && !form.cause.about().may_repeat
 }
 
 /// A set without the weak form, its strong one in the best of all its shapes.

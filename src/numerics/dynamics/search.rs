@@ -57,7 +57,7 @@ fn exchange(choice: &CauseChoice, set: &mut Vec<usize>, newest: Option<usize>) {
 
 /// One wrong mass, drive or mounting instead of several; one curve over a joint's angle instead of two.
 fn merge(choice: &CauseChoice, set: &mut Vec<usize>) {
-    let is_inertial = |number: &usize| choice.form(*number).cause.is_inertial();
+    let is_inertial = |number: &usize| choice.form(*number).cause.about().inertial;
     let inertial: Vec<usize> = set.iter().copied().filter(is_inertial).collect();
     let mut groups = pairs(&inertial);
     if inertial.len() > 1 {
@@ -67,7 +67,7 @@ fn merge(choice: &CauseChoice, set: &mut Vec<usize>) {
     let mut places: Vec<Place> = set.iter().map(|number| choice.form(*number).place).collect();
     places.dedup();
     for place in places {
-        let is_curve = |number: &usize| choice.form(*number).cause.is_of_angle() && choice.form(*number).place == place;
+        let is_curve = |number: &usize| choice.form(*number).cause.about().of_angle && choice.form(*number).place == place;
         let curves: Vec<usize> = set.iter().copied().filter(is_curve).collect();
         merge_groups(choice, set, &pairs(&curves), &is_curve);
     }

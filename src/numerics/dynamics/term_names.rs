@@ -67,7 +67,7 @@ mod tests {
         let scene = DynamicScene::new(&arm, &recording, &RecordingClock::of(&recording), 10.0, false);
         let mut tried = 0;
         for cause in TORQUE_CAUSES {
-            for form in cause.forms(&scene).into_iter().filter(|_| !cause.coefficients().is_empty()) {
+            for form in cause.forms(&scene).into_iter().filter(|_| !cause.about().coefficients.is_empty()) {
                 let term = TorqueTerm {
                     effect: cause.name().into(),
                     place: form.place,
@@ -77,9 +77,9 @@ mod tests {
                     rms: 0.0,
                 };
                 let read = term.form().expect("a cause");
-                assert!(std::ptr::eq(read.cause.coefficients(), cause.coefficients()), "{}", cause.name());
+                assert!(std::ptr::eq(read.cause.about().coefficients, cause.about().coefficients), "{}", cause.name());
                 assert_eq!(read.width, form.width, "{}", cause.name());
-                assert!(read.cause.coefficients().len() >= form.width, "{}", cause.name());
+                assert!(read.cause.about().coefficients.len() >= form.width, "{}", cause.name());
                 tried += 1;
             }
         }

@@ -34,7 +34,7 @@ pub(super) fn not_observable(choice: &CauseChoice, set: &[usize], sweep: &SweptC
     for number in 0..choice.open {
         let form = choice.form(number);
         let found = set.iter().any(|other| choice.form(*other).is_called_as(form));
-        if !found && form.width == 1 && form.cause.is_inertial() && is_unseen(choice, sweep, number) {
+        if !found && form.width == 1 && form.cause.about().inertial && is_unseen(choice, sweep, number) {
             sentences.push(format!("{} {}: these motions do not show it", form.place, form.cause.name().replace('_', " ")));
         }
     }

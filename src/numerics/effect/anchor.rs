@@ -37,10 +37,11 @@ impl Cause for AnchorShift {
             size: "any",
             confounded: "base_frame",
             needs: "distances, sockets, planes or spheres",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

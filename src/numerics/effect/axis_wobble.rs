@@ -24,6 +24,8 @@ impl Cause for AxisWobble {
             size: "5 to 100 arcsec",
             confounded: "gear_cyclic of a neighbour, coupling_ratio",
             needs: "points far off the axis",
+            measure: Some(Measure { rank: 6, advice: "measure a second target off the first" }),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -69,9 +71,5 @@ impl Cause for AxisWobble {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the axis of {} tilts as the joint turns", summary.place)
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 6, advice: "measure a second target off the first" })
     }
 }

@@ -43,6 +43,9 @@ impl Cause for Backlash {
             size: "5 to 100 arcsec",
             confounded: "joint_hardening, joint_log_lag",
             needs: "both directions of approach",
+            measure: Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" }),
+            absorbs_residual: &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -157,13 +160,5 @@ impl Cause for Backlash {
         }
         let pushed = matches!(law.first.of, Variable::Load { .. } | Variable::Push { .. });
         (pushed && *p.first()? < -error(0)).then(|| "its gap is negative".into())
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" })
     }
 }

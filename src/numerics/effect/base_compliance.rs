@@ -1,5 +1,6 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
+use super::form::placed;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
 };
@@ -34,6 +35,7 @@ impl Cause for BaseCompliance {
             size: "0.01 to 1 urad/Nm",
             confounded: "joint_compliance of joint 2, link_compliance of link 1",
             needs: "link masses",
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -53,17 +55,7 @@ impl Cause for BaseCompliance {
 }
 
 impl Placed for TiltingBase {
-    fn place(&self) -> Place {
-        Place::Base
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &BaseCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
-    }
+    placed! { self: Place::Base, &BaseCompliance, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names: &[&str] = if self.two { &["x", "y"] } else { &[""] };
@@ -86,10 +78,6 @@ impl Placed for TiltingBase {
 
     fn needs_torque(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {

@@ -49,10 +49,11 @@ impl Cause for BaseFrame {
             size: "any",
             confounded: "tool_offset, joint_offset of the first joint",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(BasePlacement { start: setting.base }))
     }
 }

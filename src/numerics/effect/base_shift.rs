@@ -1,6 +1,6 @@
 //! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
 
-use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change, names};
+use super::{Axes, Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Summary, Survey, Term, change, names};
 use crate::robot::RobotModel;
 
 pub struct BaseShift;
@@ -14,6 +14,10 @@ impl Cause for BaseShift {
             size: "20 to 500 um",
             confounded: "zero_shift of joint 1, tracker_drift",
             needs: "rows in the order of measurement",
+            measure: Some(change::MEASURE),
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -31,17 +35,5 @@ impl Cause for BaseShift {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the base (or the tracker) has moved{}", summary.when(self.name()))
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(change::MEASURE)
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

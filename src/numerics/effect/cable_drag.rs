@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
+use super::{Cause, CauseDescription, Form, Hypothesis, Summary, Survey, names};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
@@ -17,6 +17,9 @@ impl Cause for CableDrag {
             size: "1 to 10 % of the joint's torque",
             confounded: "unknown, gear_cyclic of order 1",
             needs: "motor currents",
+            measure: Some(MEASURE),
+            absorbs_residual: FINER,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -32,14 +35,6 @@ impl Cause for CableDrag {
                 "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
             ),
         }
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        FINER
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -3,8 +3,8 @@
 use super::*;
 use crate::criteria::words::REFINEMENT;
 
-/// What a cause is, in words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What a cause is: in words, and in what diagnosis asks of every cause.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CauseDescription {
     /// Canonical name.
     pub name: &'static str,
@@ -18,6 +18,34 @@ pub struct CauseDescription {
     pub confounded: &'static str,
     /// Columns of the recording and entries of the robot file without which it cannot be told.
     pub needs: &'static str,
+    /// Whether it belongs to one measurement and not to the arm.
+    pub of_the_measurement: bool,
+    /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
+    pub separable_by_poses: bool,
+    /// The size (one sigma, SI) that the coefficients of a law are held to where the rows do not determine them; nothing where they are
+    /// free.
+    pub prior_sigma: Option<f64>,
+    /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
+    pub absorbs_residual: &'static [&'static str],
+    /// What separates it from others beside more poses.
+    pub measure: Option<Measure>,
+}
+
+impl CauseDescription {
+    /// What most causes are, without words.
+    pub const PLAIN: Self = Self {
+        name: "",
+        place: "",
+        formula: "",
+        size: "",
+        confounded: "",
+        needs: "",
+        of_the_measurement: false,
+        separable_by_poses: true,
+        prior_sigma: None,
+        absorbs_residual: &[],
+        measure: None,
+    };
 }
 
 /// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
@@ -34,7 +62,7 @@ pub type NumberSpec = (String, Unit, f64);
 
 /// A cause of error.
 pub trait Cause: Sync {
-    /// What it is, in words.
+    /// What it is.
     fn about(&self) -> &'static CauseDescription;
 
     /// Its canonical name.
@@ -43,7 +71,7 @@ pub trait Cause: Sync {
     }
 
     /// The effect of the whole arm, for causes that are identified, not searched for.
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         None
     }
 
@@ -57,19 +85,9 @@ pub trait Cause: Sync {
         format!("{} at {}", self.name(), summary.place)
     }
 
-    /// Whether it belongs to one measurement and not to the arm.
-    fn is_of_the_measurement(&self) -> bool {
-        false
-    }
-
     /// Whether it is how a joint yields to its load torque: errors of the torque model move nothing without.
     fn yields_to_torque(&self) -> bool {
         false
-    }
-
-    /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
-    fn is_separable_by_poses(&self) -> bool {
-        true
     }
 
     /// Whether its forms describe something that is in no list.
@@ -77,20 +95,14 @@ pub trait Cause: Sync {
         false
     }
 
-    /// The size (one sigma, SI) that the coefficients of a law are held to where the rows do not determine them; nothing where they are
-    /// free.
-    fn held(&self, _term: &Term) -> Option<f64> {
-        None
-    }
-
-    /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[]
+    /// [`CauseDescription::prior_sigma`] of one of its terms.
+    fn prior_sigma(&self, _term: &Term) -> Option<f64> {
+        self.about().prior_sigma
     }
 
     /// The share of the gain of a finding of this name below which `part`, found beside it, is its finer shape.
     fn absorbs_below(&self, own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (own.place == part.place && self.absorbs_residual().contains(&part.name)).then_some(*REFINEMENT)
+        (own.place == part.place && self.about().absorbs_residual.contains(&part.name)).then_some(*REFINEMENT)
     }
 
     /// Whether `part` is a part of the finding `own`, which has this cause's name or a form of it, whatever it gains.
@@ -121,11 +133,6 @@ pub trait Cause: Sync {
     /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
     fn identities(&self, _term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
-    }
-
-    /// What separates it from others beside more poses.
-    fn measure(&self) -> Option<Measure> {
-        None
     }
 
     /// Reads a form that is no [`Term`], as [`Placed::body`] wrote it.
@@ -210,13 +217,13 @@ pub fn cause(name: &str) -> Option<&'static dyn Cause> {
 
 /// The effect of the whole arm of a name, if there is one.
 pub fn whole(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-    cause(name)?.whole(setting)
+    cause(name)?.arm_effect(setting)
 }
 
 /// Causes that are effects of the whole arm, which are identified; all others are searched for.
 pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    CAUSES.iter().copied().filter(move |cause| cause.whole(&setting).is_some())
+    CAUSES.iter().copied().filter(move |cause| cause.arm_effect(&setting).is_some())
 }
 
 /// Every hypothesis of every cause.

@@ -3,7 +3,7 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Summary, Survey, names};
+use super::{Cause, CauseDescription, Form, Hypothesis, Summary, Survey, names};
 
 pub struct Counterbalance;
 
@@ -16,6 +16,9 @@ impl Cause for Counterbalance {
             size: "10 to 60 % of the gravity torque",
             confounded: "gear_cyclic of order 1, link_mass",
             needs: "link masses and motor currents",
+            measure: Some(MEASURE),
+            absorbs_residual: FINER,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -25,15 +28,6 @@ impl Cause for Counterbalance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        FINER
-    }
-
-    /// The torque of a link about its own joint is of first order in that joint's angle, as a balancer's; a hose pulls by it too.
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -21,10 +21,11 @@ impl Cause for CouplingRatio {
             size: "1e-5 to 1e-2",
             confounded: "axis_wobble, link_geometry",
             needs: "a wide travel of joint A",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(DeclaredCouplings))
     }
 

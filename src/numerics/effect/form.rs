@@ -113,6 +113,25 @@ pub trait Placed: Send + Sync {
     }
 }
 
+/// Writes what every [`Placed`] has to say: `placed! { self: place, cause, [variables], what its body is made of }`.
+macro_rules! placed {
+    ($me:ident: $place:expr, $cause:expr, [$($variable:expr),+], $body:expr) => {
+        fn place(&$me) -> $crate::effect::Place {
+            $place
+        }
+        fn cause(&$me) -> &'static dyn $crate::effect::Cause {
+            $cause
+        }
+        fn variables(&$me) -> Vec<$crate::effect::Variable> {
+            vec![$($variable),+]
+        }
+        fn body(&$me) -> serde_json::Value {
+            serde_json::json!($body)
+        }
+    };
+}
+pub(super) use placed;
+
 /// A form of any cause.
 #[derive(Clone)]
 pub struct Form(Arc<dyn Placed>);
@@ -185,7 +204,7 @@ impl Form {
     pub fn is_of_the_measurement(&self) -> bool {
         let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
         let instrument = || self.place() == Place::Tracker;
-        self.cause().is_of_the_measurement() || (self.cause().is_nameless() && (passing() || instrument()))
+        self.cause().about().of_the_measurement || (self.cause().is_nameless() && (passing() || instrument()))
     }
 }
 

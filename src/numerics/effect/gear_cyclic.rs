@@ -34,6 +34,9 @@ impl Cause for GearCyclic {
             size: "5 to 100 arcsec",
             confounded: "counterbalance at n = 1, axis_wobble",
             needs: "enough points a period",
+            absorbs_residual: &[names::UNKNOWN],
+            prior_sigma: Some(orders::LARGE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -70,14 +73,6 @@ impl Cause for GearCyclic {
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(names::JOINT_TABLE).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
-    }
-
-    fn held(&self, _term: &Term) -> Option<f64> {
-        Some(orders::LARGE)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
     }
 
     fn identities(&self, term: &Term, _called: &str) -> Vec<(&'static str, Place)> {

@@ -27,6 +27,10 @@ impl Cause for GearFlank {
             size: "2 to 40 arcsec",
             confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
             needs: "both directions of approach over the joint's range",
+            measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
+            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+            prior_sigma: Some(orders::LARGE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -47,20 +51,8 @@ impl Cause for GearFlank {
         orders::variant(term)
     }
 
-    fn held(&self, _term: &Term) -> Option<f64> {
-        Some(orders::LARGE)
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         let orders = orders::in_words(summary, self.name());
         format!("the two flanks of the teeth of {} err differently: {} to either side", summary.place, orders)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::BACKLASH, names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" })
     }
 }

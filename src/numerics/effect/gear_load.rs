@@ -28,6 +28,12 @@ impl Cause for GearLoad {
             size: "2 to 40 arcsec under full load",
             confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
             needs: "link masses, loads that change at the same angle",
+            measure: Some(Measure {
+                rank: 5,
+                advice: "repeat poses with and without a payload over the whole range of the joint",
+            }),
+            absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -51,13 +57,5 @@ impl Cause for GearLoad {
     fn sentence(&self, summary: &Summary) -> String {
         let orders = orders::in_words(summary, self.name());
         format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 5, advice: "repeat poses with and without a payload over the whole range of the joint" })
     }
 }

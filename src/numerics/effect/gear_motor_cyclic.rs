@@ -19,6 +19,8 @@ impl Cause for GearMotorCyclic {
             size: "2 to 30 arcsec",
             confounded: "noise: nothing else is as fast",
             needs: "reduction ratios in the robot file",
+            prior_sigma: Some(orders::LARGE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -36,10 +38,6 @@ impl Cause for GearMotorCyclic {
 
     fn variant(&self, term: &Term) -> String {
         orders::variant(term)
-    }
-
-    fn held(&self, _term: &Term) -> Option<f64> {
-        Some(orders::LARGE)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -3,6 +3,7 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`]; where nobody knows the
 //! masses, gravity's torque per first moment, see [`UnweighedWindup`].
 
+use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
@@ -23,10 +24,12 @@ impl Cause for JointCompliance {
             size: "0.1 to 10 urad/Nm",
             confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
             needs: "link masses, motor currents, or many postures",
+            absorbs_residual: &[names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Windups(setting.load)))
     }
 
@@ -60,10 +63,6 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         UnweighedWindup::read(&Self, body).or_else(|| Some(Windup::deserialize(body).map(Form::from)))
     }
@@ -82,17 +81,7 @@ pub struct Windup {
 }
 
 impl Placed for Windup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint }]
-    }
+    placed! { self: Place::Joint(self.joint), &JointCompliance, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let prior_sigma = match self.load {
@@ -126,10 +115,6 @@ impl Placed for Windup {
 
     fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, *p.first()?))
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }
 

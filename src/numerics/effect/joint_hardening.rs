@@ -1,5 +1,6 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
+use super::form::placed;
 use super::joint_table::PLAUSIBLE;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
@@ -58,6 +59,12 @@ impl Cause for JointHardening {
             size: "5 to 50 % of the wind-up",
             confounded: "joint_compliance, backlash",
             needs: "link masses and two payloads",
+            measure: Some(Measure {
+                rank: 7,
+                advice: "measure with a third payload between none and full, and with joints near their largest load",
+            }),
+            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -86,10 +93,6 @@ impl Cause for JointHardening {
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::BACKLASH, names::UNKNOWN]
-    }
-
     /// A joint has one wind-up.
     fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
         own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
@@ -100,11 +103,6 @@ impl Cause for JointHardening {
     }
 
     /// From a wind-up in proportion.
-    fn measure(&self) -> Option<Measure> {
-        let advice = "measure with a third payload between none and full, and with joints near their largest load";
-        Some(Measure { rank: 7, advice })
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(BentWindup::deserialize(body).map(Form::from))
     }
@@ -164,17 +162,7 @@ impl BentWindup {
 }
 
 impl Placed for BentWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointHardening
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.joint }]
-    }
+    placed! { self: Place::Joint(self.joint), &JointHardening, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];
@@ -258,10 +246,6 @@ impl Placed for BentWindup {
             HardeningLaw::Power { exponent, .. } => Some(format!("it grows by the load to the power of {}", figure(exponent, 1))),
             HardeningLaw::Curve { .. } => None,
         }
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {

@@ -1,6 +1,7 @@
 //! `joint_log_lag`: joints and points are not of one moment. Of standing points a share of the last move was still to come when the
 //! joints were logged, or, where a controller ends the moves of all joints together, a turn shared out as these moves are; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
+use super::form::placed;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary,
     Survey, Variable, figure, names,
@@ -46,6 +47,9 @@ impl Cause for JointLogLag {
             size: "0.1 to 5 % of the move; 0.5 to 20 ms",
             confounded: "backlash; viscous_windup where one joint moves alone",
             needs: "rows in the order of measurement; joint velocities",
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -102,31 +106,13 @@ impl Cause for JointLogLag {
         clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
     }
 
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Lag::deserialize(body).map(Form::from))
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }
 
 impl Placed for Lag {
-    fn place(&self) -> Place {
-        Place::Recording
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &JointLogLag
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }]
-    }
+    placed! { self: Place::Recording, &JointLogLag, [if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }], self }
 
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
         match (self.by, self.each) {
@@ -153,9 +139,5 @@ impl Placed for Lag {
     fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         let (most, share) = p.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
         (self.by != Behind::Clock && share < -error(most)).then(|| "a lag is not below zero".into())
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }

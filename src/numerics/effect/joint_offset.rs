@@ -16,10 +16,11 @@ impl Cause for JointOffset {
             size: "0.1 to 5 mrad",
             confounded: "base_frame, link_geometry",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

@@ -40,6 +40,8 @@ impl Cause for JointTable {
             size: "5 to 200 arcsec",
             confounded: "gear_cyclic",
             needs: "many points",
+            absorbs_residual: &[names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -75,10 +77,6 @@ impl Cause for JointTable {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} has a repeatable error of no simple form, kept as a table", summary.place)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
     }
 }
 
@@ -137,8 +135,8 @@ mod tests {
         let rows = |k: i32| f64::from(k);
         let whole = found((0..120).map(rows), 10.0);
         assert!(whole.is_empty(), "{whole:?}");
-        let lonely = (0..=50).chain([60]).chain(70..=120).map(rows);
-        let gaps = found(lonely, 10.0);
+        let isolated = (0..=50).chain([60]).chain(70..=120).map(rows);
+        let gaps = found(isolated, 10.0);
         let [[low, high]] = gaps[..] else { panic!("{gaps:?}") };
         assert!((50.0..55.0).contains(&low) && (65.0..70.0).contains(&high), "{low} to {high}");
         // A wave that is longer than the gap has rows enough.

@@ -1,8 +1,7 @@
 //! `joint_warming`: a joint's zero, ratio or stiffness follows a temperature, the warm-up, or the heat of the joint's own work.
 
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
-    warmth,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names, warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
@@ -38,6 +37,10 @@ impl Cause for JointWarming {
             size: "1 to 50 arcsec",
             confounded: "tracker_drift and base_shift (joint 1), thermal_growth",
             needs: "temperature or time",
+            measure: Some(super::thermal_growth::MEASURE),
+            absorbs_residual: &[names::UNKNOWN],
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -110,17 +113,5 @@ impl Cause for JointWarming {
             }
         });
         format!("{} changes with warmth: {}", summary.place, each.collect::<Vec<_>>().join(", "))
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(super::thermal_growth::MEASURE)
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

@@ -1,5 +1,6 @@
 //! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
 
+use super::form::placed;
 use super::motion::{SHORT, extent};
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
@@ -45,6 +46,7 @@ impl Cause for LinkCompliance {
             size: "0.05 to 1 urad/Nm",
             confounded: "joint_compliance of either end",
             needs: "link masses",
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -76,17 +78,7 @@ impl Cause for LinkCompliance {
 }
 
 impl Placed for BentLink {
-    fn place(&self) -> Place {
-        Place::Links(self.link, self.link)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &LinkCompliance
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
-    }
+    placed! { self: Place::Links(self.link, self.link), &LinkCompliance, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names: &[&str] = if self.bending == Bending::TwoDirections { &["first", "second"] } else { &[""] };
@@ -112,9 +104,5 @@ impl Placed for BentLink {
 
     fn needs_torque(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }

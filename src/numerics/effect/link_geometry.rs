@@ -27,10 +27,11 @@ impl Cause for LinkGeometry {
             size: "0.1 to 1 mm, 0.1 to 1 mrad",
             confounded: "joint_offset, tool_offset",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

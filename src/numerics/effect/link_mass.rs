@@ -1,9 +1,9 @@
 //! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
+use super::form::placed;
 use super::spring::{MEASURE, Spring};
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -30,6 +30,8 @@ impl Cause for LinkMass {
             size: "3 to 20 %",
             confounded: "counterbalance, payload_error",
             needs: "link masses and motor currents",
+            measure: Some(MEASURE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -47,27 +49,13 @@ impl Cause for LinkMass {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
     }
 
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(WrongLinkMass::deserialize(body).map(Form::from))
     }
 }
 
 impl Placed for WrongLinkMass {
-    fn place(&self) -> Place {
-        Place::Links(self.link, self.link)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &LinkMass
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::ArmLoad]
-    }
+    placed! { self: Place::Links(self.link, self.link), &LinkMass, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mass = ("mass".into(), Unit::Kilogram, 1e4);
@@ -104,9 +92,5 @@ impl Placed for WrongLinkMass {
 
     fn is_of_torque_model(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }

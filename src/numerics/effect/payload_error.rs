@@ -1,9 +1,10 @@
 //! `payload_error`: the payload's mass (and first moment) differs from what was declared, where one is carried.
 
+use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Summary, Survey,
-    Variable, figure, names,
+    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -34,6 +35,8 @@ impl Cause for PayloadError {
             size: "3 to 30 %",
             confounded: "joint_hardening",
             needs: "rows with and without the payload",
+            measure: Some(MEASURE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -64,27 +67,13 @@ impl Cause for PayloadError {
         }
     }
 
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
-    }
-
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(WrongPayload::deserialize(body).map(Form::from))
     }
 }
 
 impl Placed for WrongPayload {
-    fn place(&self) -> Place {
-        Place::Tool
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        &PayloadError
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![if self.tool { Variable::ArmLoad } else { Variable::Payload }]
-    }
+    placed! { self: Place::Tool, &PayloadError, [if self.tool { Variable::ArmLoad } else { Variable::Payload }], self }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
@@ -123,9 +112,5 @@ impl Placed for WrongPayload {
 
     fn is_of_torque_model(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self)
     }
 }

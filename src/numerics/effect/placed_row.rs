@@ -88,7 +88,7 @@ pub struct PlacedRow<'a> {
 impl PlacedRow<'_> {
     /// The target's orientation.
     pub fn orientation(&self) -> Matrix3<f64> {
-        self.scratch.posture.behind[self.robot.joints()].rotation * self.robot.seat(self.scratch.target).rotation
+        self.scratch.posture.behind[self.robot.joints()].rotation * self.robot.mounting(self.scratch.target).rotation
     }
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.

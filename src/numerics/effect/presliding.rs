@@ -31,6 +31,12 @@ impl Cause for Presliding {
             size: "5 to 60 arcsec over 0.5 to 10 deg",
             confounded: "backlash where all moves are long, joint_log_lag",
             needs: "rows in the order of measurement, short moves among them",
+            measure: Some(Measure {
+                rank: 5,
+                advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
+            }),
+            absorbs_residual: &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -61,13 +67,5 @@ impl Cause for Presliding {
         });
         let over = travel.map_or_else(String::new, |travel| format!(" over a travel of {travel} deg"));
         format!("lost motion of {} fades in after each reversal{over}: {} to either side", summary.place, summary.size())
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 5, advice: "approach one pose from both sides in steps of a tenth of a degree up to ten" })
     }
 }

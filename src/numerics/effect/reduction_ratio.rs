@@ -20,10 +20,11 @@ impl Cause for ReductionRatio {
             size: "1e-5 to 1e-3",
             confounded: "joint_compliance, gear_cyclic of order 1",
             needs: "a wide travel of the joint",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
 
+use super::form::placed;
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -66,17 +67,7 @@ impl Spring {
 }
 
 impl Placed for Spring {
-    fn place(&self) -> Place {
-        Place::Joint(self.shape.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Angle { joint: self.shape.joint }]
-    }
+    placed! { self: Place::Joint(self.shape.joint), self.cause, [Variable::Angle { joint: self.shape.joint }], self.shape }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names = ["sin", "cos", "sin2", "cos2"].into_iter().take(2 * self.shape.orders as usize);
@@ -104,9 +95,5 @@ impl Placed for Spring {
 
     fn is_of_torque_model(&self) -> bool {
         true
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self.shape)
     }
 }

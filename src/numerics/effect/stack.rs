@@ -269,7 +269,7 @@ impl EffectStack {
                 scratch.posture.body[k] = frame;
             }
         }
-        frame.point(&robot.seat(scratch.target).translation)
+        frame.point(&robot.mounting(scratch.target).translation)
     }
 }
 

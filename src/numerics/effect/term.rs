@@ -154,7 +154,7 @@ impl Placed for Term {
     }
 
     fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        Some((0..self.law.count(), self.cause.held(self)?))
+        Some((0..self.law.count(), self.cause.prior_sigma(self)?))
     }
 
     fn free_curve(&self) -> std::ops::Range<usize> {

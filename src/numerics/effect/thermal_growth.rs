@@ -31,6 +31,8 @@ impl Cause for ThermalGrowth {
             size: "10 to 25 um/m for each kelvin",
             confounded: "tracker_drift, growth of neighbouring links",
             needs: "temperature or time",
+            measure: Some(MEASURE),
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -93,9 +95,5 @@ impl Cause for ThermalGrowth {
             }
             _ => format!("{place} grows with warmth"),
         }
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 }

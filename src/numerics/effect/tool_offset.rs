@@ -35,10 +35,11 @@ impl Cause for ToolOffset {
             size: "any",
             confounded: "link_geometry of the last link",
             needs: "-",
+            ..CauseDescription::PLAIN
         }
     }
 
-    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
+    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }
@@ -78,7 +79,7 @@ impl Effect for ToolOffset {
         }
         if let Some(target) = number.and_then(|number| targets.get(number)).filter(|target| target.oriented) {
             for axis in 0..3 {
-                let turn = screw(&Vector3::ith(axis, 1.0), &target.seat.translation);
+                let turn = screw(&Vector3::ith(axis, 1.0), &target.mounting.translation);
                 out.shift(first + 3 + axis, p, robot.joints(), turn);
             }
         }

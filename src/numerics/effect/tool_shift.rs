@@ -1,8 +1,8 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
 use super::{
-    Axes, Cause, CauseDescription, FittedForms, Hypothesis, Measure, ModelledFinding, Motion, NamedForms, NumberSpec, Place,
-    Summary, Survey, Term, change, holder, names,
+    Axes, Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, NumberSpec, Place, Summary,
+    Survey, Term, change, holder, names,
 };
 use crate::robot::RobotModel;
 
@@ -18,6 +18,9 @@ impl Cause for ToolShift {
             size: "20 to 500 um",
             confounded: "zero_shift of the last joints",
             needs: "rows in the order of measurement",
+            measure: Some(change::MEASURE),
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -47,13 +50,5 @@ impl Cause for ToolShift {
 
     fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {
         holder::turned(fitted)
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(change::MEASURE)
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

@@ -22,6 +22,9 @@ impl Cause for TrackerCircle {
             size: "0.5 to 5 arcsec",
             confounded: "base_frame and gear_cyclic of joint 1 where the azimuth changes little",
             needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
+            measure: Some(MEASURE),
+            of_the_measurement: true,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -43,13 +46,5 @@ impl Cause for TrackerCircle {
     fn sentence(&self, summary: &Summary) -> String {
         let orders = orders::in_words(summary, self.name());
         format!("the tracker's azimuths err periodically: {orders}")
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 }

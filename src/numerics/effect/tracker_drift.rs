@@ -2,8 +2,7 @@
 
 use super::basis::around;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable,
-    warmth,
+    Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -24,6 +23,10 @@ impl Cause for TrackerDrift {
             size: "10 to 200 um",
             confounded: "thermal_growth, base_shift",
             needs: "time",
+            measure: Some(super::thermal_growth::MEASURE),
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -78,17 +81,5 @@ impl Cause for TrackerDrift {
         };
         let over = if summary.clock == Clock::Rows { " over the recording's rows" } else { "" };
         format!("the tracker's frame drifts {how}{over}")
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(super::thermal_growth::MEASURE)
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

@@ -3,7 +3,7 @@
 
 use super::summary::amplitude;
 use super::tracker_circle::MEASURE;
-use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
+use super::{Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -22,6 +22,9 @@ impl Cause for TrackerElevation {
             size: "0.5 to 5 arcsec",
             confounded: "base_frame and link_geometry where the elevation changes little",
             needs: "points measured from outside the arm's reach, the instrument at the recording's origin, its z upright",
+            measure: Some(MEASURE),
+            of_the_measurement: true,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -50,13 +53,5 @@ impl Cause for TrackerElevation {
         });
         let ways: Vec<String> = ways.collect();
         format!("the tracker's head errs with the elevation: {}", ways.join(", "))
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(MEASURE)
     }
 }

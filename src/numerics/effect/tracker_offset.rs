@@ -21,6 +21,9 @@ impl Cause for TrackerOffset {
             size: "5 um to the radius of a reflector",
             confounded: "base_frame and link_geometry, which absorb most of it from afar",
             needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
+            measure: Some(Measure { rank: 2, advice: "measure a line of three points from within it and from its end" }),
+            of_the_measurement: true,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -36,13 +39,5 @@ impl Cause for TrackerOffset {
     fn sentence(&self, summary: &Summary) -> String {
         let um = summary.parameters.first().map_or_else(String::new, |n| figure(n.value * 1e3, 0));
         format!("every range of the tracker is wrong by {um} um")
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 2, advice: "measure a line of three points from within it and from its end" })
     }
 }

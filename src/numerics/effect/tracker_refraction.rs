@@ -26,6 +26,13 @@ impl Cause for TrackerRefraction {
             size: "1 um/m for each kelvin",
             confounded: "tracker_drift and thermal_growth of all links",
             needs: "temperature or time, the instrument at the recording's origin",
+            measure: Some(Measure {
+                rank: 2,
+                advice: "log the air's temperature and measure a fixed point on the floor now and then",
+            }),
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -70,17 +77,5 @@ impl Cause for TrackerRefraction {
             }
             _ => format!("the tracker's ranges grow by {size} um/m for each kelvin"),
         }
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(Measure { rank: 2, advice: "log the air's temperature and measure a fixed point on the floor now and then" })
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

@@ -13,10 +13,8 @@ impl Cause for TrackerScale {
             size: "1 to 20 um/m",
             confounded: "link_geometry, which absorbs it",
             needs: "a scale bar: points of the arm never show it",
+            of_the_measurement: true,
+            ..CauseDescription::PLAIN
         }
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
     }
 }

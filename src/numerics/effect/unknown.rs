@@ -112,6 +112,8 @@ impl Cause for Unknown {
             size: "any",
             confounded: "whatever is in no list",
             needs: "-",
+            absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_TABLE],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -200,7 +202,7 @@ impl Cause for Unknown {
         }
     }
 
-    fn held(&self, term: &Term) -> Option<f64> {
+    fn prior_sigma(&self, term: &Term) -> Option<f64> {
         let loaded = term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. }));
         let of_joint = matches!(term.motion(), Motion::Joint { .. });
         (of_joint && !loaded && !term.is_own_curve()).then_some(orders::LARGE)
@@ -301,10 +303,6 @@ impl Cause for Unknown {
 
     fn is_nameless(&self) -> bool {
         true
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::GEAR_CYCLIC, names::JOINT_TABLE]
     }
 
     /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.

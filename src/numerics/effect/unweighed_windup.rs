@@ -3,6 +3,7 @@
 //!
 //! Bodies are those from the joint outwards, their moments base parameters: two a joint that turns. Bodies that slide are left out.
 
+use super::form::placed;
 use super::skeleton::moments;
 use super::{
     ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, ParameterEstimate, Place, Placed, Survey, Variable, figure, names,
@@ -159,21 +160,11 @@ impl Moment {
 }
 
 impl Placed for UnweighedWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.shape.joint)
-    }
-
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
-    }
+    placed! { self: Place::Joint(self.shape.joint), self.cause, [Variable::Load { joint: self.shape.joint }], self.shape }
 
     /// Moments beside the arm's lines, which are small: those along them are as large as links are heavy.
     fn of_one_size(&self) -> Vec<usize> {
         (0..self.shape.moments.len()).filter(|k| !self.shape.moments[*k].outwards).collect()
-    }
-
-    fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Load { joint: self.shape.joint }]
     }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
@@ -232,9 +223,5 @@ impl Placed for UnweighedWindup {
 
     fn words(&self, numbers: &[&ParameterEstimate]) -> Option<String> {
         Some(self.largest(numbers))
-    }
-
-    fn body(&self) -> serde_json::Value {
-        serde_json::json!(self.shape)
     }
 }

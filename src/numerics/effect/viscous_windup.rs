@@ -26,6 +26,8 @@ impl Cause for ViscousWindup {
             size: "0.2 to 10 arcsec for each deg/s",
             confounded: "joint_log_lag where one joint moves alone",
             needs: "joint velocities, of a moving arm",
+            absorbs_residual: &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN],
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -53,9 +55,5 @@ impl Cause for ViscousWindup {
         let turns = matches!(form.place(), Place::Joint(joint) if robot.is_revolute(joint));
         let unit = Unit::ArcsecondPerDegreePerSecond;
         turns.then_some(HiddenSize { subject: None, may: "may trail", least: TRAIL, unit })
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN]
     }
 }

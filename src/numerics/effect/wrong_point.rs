@@ -13,15 +13,10 @@ impl Cause for Outlier {
             size: "any",
             confounded: "-",
             needs: "-",
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }
 
@@ -36,14 +31,9 @@ impl Cause for MislabelledPoint {
             size: "any",
             confounded: "-",
             needs: "-",
+            of_the_measurement: true,
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        true
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

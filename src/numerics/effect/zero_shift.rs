@@ -1,8 +1,8 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
 use super::{
-    Cause, CauseDescription, FittedForms, Hypothesis, Measure, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term,
-    change, holder, names,
+    Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term, change,
+    holder, names,
 };
 use crate::robot::RobotModel;
 
@@ -18,6 +18,9 @@ impl Cause for ZeroShift {
             size: "10 to 500 arcsec",
             confounded: "base_shift (joint 1), tool_shift (last joint)",
             needs: "rows in the order of measurement",
+            measure: Some(change::MEASURE),
+            separable_by_poses: false,
+            ..CauseDescription::PLAIN
         }
     }
 
@@ -44,13 +47,5 @@ impl Cause for ZeroShift {
 
     fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {
         holder::turned(fitted)
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        Some(change::MEASURE)
-    }
-
-    fn is_separable_by_poses(&self) -> bool {
-        false
     }
 }

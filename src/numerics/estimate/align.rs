@@ -19,11 +19,11 @@ const JUDGES: usize = 500;
 /// has it, else the identity.
 pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     let all = rows;
-    let rows: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
+    let rows: Vec<usize> = rows.iter().copied().filter(|row| data.has_point(*row)).collect();
     if rows.len() < 3 {
         return KINDS.iter().find_map(|kind| kind.base(robot, data, all)).unwrap_or_else(Pose::identity);
     }
-    let seat = |row: usize| robot.seat(robot.setup().target(data.target(row)));
+    let seat = |row: usize| robot.mounting(robot.setup().target(data.target(row)));
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
     let measured: Vec<Vector3<f64>> = rows.iter().filter_map(|row| data.point(*row)).collect();
     align_points(&model, &measured)

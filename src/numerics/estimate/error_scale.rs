@@ -27,7 +27,7 @@ pub enum ErrorScale {
 impl ErrorScale {
     /// Of some rows of a recording.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
-        if data.readings.is_empty() && rows.iter().all(|row| data.whole(*row)) {
+        if data.readings.is_empty() && rows.iter().all(|row| data.has_point(*row)) {
             return Self::Lengths;
         }
         let dimension = dimension(data, rows);

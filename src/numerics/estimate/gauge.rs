@@ -29,7 +29,7 @@ pub fn gauge(
     };
     let seat = |name: &String| {
         let offset = stated.get(name).copied().unwrap_or_else(Vector3::zeros);
-        Target { name: name.clone(), seat: Pose::new(home.rotation, home.point(&offset)), oriented: false }
+        Target { name: name.clone(), mounting: Pose::new(home.rotation, home.point(&offset)), oriented: false }
     };
     let mut robot = robot.measured_by(MeasurementSetup { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
@@ -39,7 +39,7 @@ pub fn gauge(
             break;
         }
         let place = |target: &Target| match seen_at(&robot, data, rows, &base, target).filter(|_| open(target)) {
-            Some(point) => Target { seat: Pose::new(target.seat.rotation, point), ..target.clone() },
+            Some(point) => Target { mounting: Pose::new(target.mounting.rotation, point), ..target.clone() },
             None => target.clone(),
         };
         let targets = robot.setup().targets.iter().map(place).collect();
@@ -47,7 +47,7 @@ pub fn gauge(
         base = align(&robot, data, rows);
     }
     let turned = |target: &Target| match rotation_of(&robot, data, rows, &base, target) {
-        Some(rotation) => Target { seat: Pose::new(rotation, target.seat.translation), oriented: true, ..target.clone() },
+        Some(rotation) => Target { mounting: Pose::new(rotation, target.mounting.translation), oriented: true, ..target.clone() },
         None => target.clone(),
     };
     let targets = robot.setup().targets.iter().map(turned).collect();

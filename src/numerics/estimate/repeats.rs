@@ -128,7 +128,7 @@ fn in_first_pose(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<Vect
 /// The whole points among the rows of a pose, by target.
 fn points(data: &Measurements, pose: &[usize]) -> Vec<Vec<usize>> {
     let mut by_target: Vec<Vec<usize>> = Vec::new();
-    for row in pose.iter().filter(|row| data.whole(**row)) {
+    for row in pose.iter().filter(|row| data.has_point(**row)) {
         match by_target.iter_mut().find(|rows| data.target(rows[0]) == data.target(*row)) {
             Some(rows) => rows.push(*row),
             None => by_target.push(vec![*row]),

@@ -49,7 +49,7 @@ impl Model {
             if number < first + width {
                 let corrected = corrected(target, x.get(first..first + width)?);
                 let axis = number - first;
-                return Some((self.beside_tool(&target.seat, axis), self.beside_tool(&corrected, axis)));
+                return Some((self.beside_tool(&target.mounting, axis), self.beside_tool(&corrected, axis)));
             }
             first += width;
         }
@@ -70,10 +70,10 @@ fn corrected(target: &Target, x: &[f64]) -> Pose {
         if axis < 3 {
             twist[axis] += value;
         } else {
-            twist += crate::spatial::screw(&Vector3::ith(axis - 3, 1.0), &target.seat.translation) * *value;
+            twist += crate::spatial::screw(&Vector3::ith(axis - 3, 1.0), &target.mounting.translation) * *value;
         }
     }
-    Pose::exp(&twist) * target.seat
+    Pose::exp(&twist) * target.mounting
 }
 
 /// x, y, z (m) or a component of the rotation vector (rad).

@@ -29,7 +29,7 @@ impl Weight {
         let measured = |axis: usize| data.points.has(row, axis);
         let full = data.spread.as_ref().map(|all| {
             let covariance = all[row] + Matrix3::from_diagonal(&variance);
-            if data.whole(row) {
+            if data.has_point(row) {
                 return covariance;
             }
             // What was not measured stands apart, so that the others are weighted by their own covariance.
@@ -37,7 +37,7 @@ impl Weight {
             Matrix3::from_fn(|i, j| if measured(i) && measured(j) { covariance[(i, j)] } else { apart(i, j) })
         });
         match full.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse()) {
-            Some(inverse) if data.whole(row) => Self::Full(inverse),
+            Some(inverse) if data.has_point(row) => Self::Full(inverse),
             Some(inverse) => Self::Full(Matrix3::from_fn(|i, j| if measured(i) && measured(j) { inverse[(i, j)] } else { 0.0 })),
             None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
         }

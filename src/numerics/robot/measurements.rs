@@ -94,14 +94,14 @@ impl Measurements {
     }
 
     /// The place of a row in the order of measurement, from 0.
-    pub fn place(&self, row: usize) -> usize {
-        self.sequence.as_ref().map_or(row, |sequence| sequence.place(row))
+    pub fn rank_in_time(&self, row: usize) -> usize {
+        self.sequence.as_ref().map_or(row, |sequence| sequence.rank_in_time(row))
     }
 
     /// The first row of the stop at which a row was measured: several targets in a row, one after the other in one pose.
     pub fn stop(&self, row: usize) -> usize {
         let Some(target) = &self.target else { return row };
-        let (here, name) = (self.place(row), |place: usize| target.name(self.at_place(place)));
+        let (here, name) = (self.rank_in_time(row), |place: usize| target.name(self.at_place(place)));
         let mut first = (0..here).rev().take_while(|other| self.near_pose(self.at_place(*other), row)).last().unwrap_or(here);
         for other in first + 1..=here {
             // The same target again: the arm came back to the pose.
@@ -114,13 +114,13 @@ impl Measurements {
 
     /// Whether a row was measured at the recording's first stop, to which nobody knows the way.
     pub fn at_first_stop(&self, row: usize) -> bool {
-        self.place(self.stop(row)) == 0
+        self.rank_in_time(self.stop(row)) == 0
     }
 
     /// The last row of the stop before that of a row, and the first row of its own; none at the first stop.
     pub fn preceding_move(&self, row: usize) -> Option<[usize; 2]> {
         let first = self.stop(row);
-        Some([self.at_place(self.place(first).checked_sub(1)?), first])
+        Some([self.at_place(self.rank_in_time(first).checked_sub(1)?), first])
     }
 
     /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
@@ -133,7 +133,7 @@ impl Measurements {
         if let Some(direction) = self.recorded_direction(row, joint) {
             return direction;
         }
-        let moves = (0..=self.place(row)).rev().map(|place| self.last_move(self.at_place(place), joint));
+        let moves = (0..=self.rank_in_time(row)).rev().map(|place| self.last_move(self.at_place(place), joint));
         moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
     }
 
@@ -162,12 +162,12 @@ impl Measurements {
 
     /// The point of a row (tracker frame, m) where all of its axes were measured: who needs a point in space asks for it here.
     pub fn point(&self, row: usize) -> Option<Vector3<f64>> {
-        self.points.whole(row)
+        self.points.all_axes(row)
     }
 
     /// Whether all three axes of a row's point were measured.
-    pub fn whole(&self, row: usize) -> bool {
-        self.points.whole(row).is_some()
+    pub fn has_point(&self, row: usize) -> bool {
+        self.points.all_axes(row).is_some()
     }
 
     /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.

@@ -56,8 +56,8 @@ impl RobotModel {
     }
 
     /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
-    pub fn seat(&self, target: Option<usize>) -> &Pose {
-        target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.seat)
+    pub fn mounting(&self, target: Option<usize>) -> &Pose {
+        target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.mounting)
     }
 
     /// The data that the model was made of.

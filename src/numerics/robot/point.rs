@@ -51,7 +51,7 @@ impl PointReadings {
     }
 
     /// Where all three axes of a row were measured: its point.
-    pub fn whole(&self, row: usize) -> Option<Vector3<f64>> {
+    pub fn all_axes(&self, row: usize) -> Option<Vector3<f64>> {
         let is_whole = self.sigma.get(row).is_some_and(|sigma| sigma.iter().all(|sigma| sigma.is_finite()));
         is_whole.then(|| self.position[row])
     }
@@ -80,7 +80,7 @@ impl PointReadings {
 
     /// Measured - predicted (m) of a row's point; zero along axes that were not measured.
     pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
-        match self.whole(row) {
+        match self.all_axes(row) {
             Some(point) => point - predicted,
             None => {
                 Vector3::from_fn(|axis, _| if self.has(row, axis) { self.position[row][axis] - predicted[axis] } else { 0.0 })

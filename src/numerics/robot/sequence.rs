@@ -40,7 +40,7 @@ impl Sequence {
     }
 
     /// The place of a row.
-    pub fn place(&self, row: usize) -> usize {
+    pub fn rank_in_time(&self, row: usize) -> usize {
         self.places[row]
     }
 }
@@ -54,7 +54,7 @@ mod tests {
         let by_name = [50.0, 10.0, 40.0, 0.0, 20.0, 30.0];
         let sequence = Sequence::by_time(&by_name, |_, _| false).expect("an order");
         assert_eq!((0..6).map(|place| sequence.row(place)).collect::<Vec<_>>(), [3, 1, 4, 5, 2, 0]);
-        assert_eq!((0..6).map(|row| sequence.place(row)).collect::<Vec<_>>(), [5, 1, 4, 0, 2, 3]);
+        assert_eq!((0..6).map(|row| sequence.rank_in_time(row)).collect::<Vec<_>>(), [5, 1, 4, 0, 2, 3]);
         let in_order: Vec<f64> = (0..40).map(f64::from).collect();
         let twice: Vec<f64> = in_order.iter().chain(&in_order).copied().collect();
         for time in [&in_order, &twice, &[f64::NAN; 40].to_vec()] {

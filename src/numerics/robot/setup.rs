@@ -1,4 +1,4 @@
-//! What a recording measures with: targets on the tool, each with its own seat, and anchors in the cell: ends of distances, sockets, planes,
+//! What a recording measures with: targets on the tool, each with its own mounting, and anchors in the cell: ends of distances, sockets, planes,
 //! spheres.
 
 use crate::spatial::Pose;
@@ -10,7 +10,7 @@ pub struct Target {
     /// As the recording calls it; empty where it has no name.
     pub name: String,
     /// Where it is believed to sit, zero pose, base frame.
-    pub seat: Pose,
+    pub mounting: Pose,
     /// Whether its orientation is measured too.
     pub oriented: bool,
 }

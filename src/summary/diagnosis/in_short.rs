@@ -3,7 +3,7 @@
 use super::{DiagnosisSummary, rival_words};
 use crate::error::counted;
 use crate::summary::labelled;
-use crate::table::{FindingRow, RivalRow, is_separable_by_poses};
+use crate::table::{FindingRow, RivalRow, VerdictTopic, is_separable_by_poses};
 use crate::units::Unit;
 
 /// Findings that a run names in its one line.
@@ -57,13 +57,16 @@ impl DiagnosisSummary {
         for finding in &self.findings.0 {
             text.push_str(&labelled(&format!("{:>3}.", finding.rank), &self.finding_in_a_line(finding)));
         }
-        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+        for line in self.said(VerdictTopic::Withdrawn) {
             text.push_str(&labelled("withdrawn", line));
         }
         text.extend(v.signature.iter().map(|signature| labelled("left", signature)));
         text.extend(self.set_aside().map(|rows| labelled("set aside", &rows)));
-        let unseen: Vec<&str> =
-            v.not_observable.lines().map(|line| line.split_once(": ").map_or(line, |(what, _)| what)).collect();
+        let unseen: Vec<&str> = self
+            .said(VerdictTopic::NotObservable)
+            .into_iter()
+            .map(|line| line.split_once(": ").map_or(line, |(what, _)| what))
+            .collect();
         if !unseen.is_empty() {
             text.push_str(&labelled("limits", &format!("not observable from these data: {}", unseen.join(", "))));
         }

@@ -11,7 +11,7 @@ use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
     FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table, Verdict,
-    VerdictRow, formula_in_words, is_separable_by_poses,
+    VerdictRow, VerdictSentences, VerdictTopic, formula_in_words, is_separable_by_poses,
 };
 use serde_json::{Value, json};
 
@@ -20,6 +20,7 @@ pub struct DiagnosisSummary {
     run: String,
     step: String,
     verdict: VerdictRow,
+    sentences: VerdictSentences,
     findings: Findings,
     numbers: FindingNumbers,
     rivals: Rivals,
@@ -94,6 +95,7 @@ impl DiagnosisSummary {
             run,
             step,
             verdict,
+            sentences: table(stage, store)?,
             findings,
             numbers,
             rivals: table(stage, store)?,
@@ -103,9 +105,16 @@ impl DiagnosisSummary {
         })
     }
 
+    fn said(&self, topic: VerdictTopic) -> Vec<&str> {
+        self.sentences.about(&self.verdict.step, topic)
+    }
+
     /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
     fn next(&self, store: &str) -> Option<Vec<String>> {
-        let mut lines: Vec<String> = self.verdict.next_measurements.as_deref()?.lines().map(String::from).collect();
+        let mut lines: Vec<String> = self.said(VerdictTopic::NextMeasurement).into_iter().map(String::from).collect();
+        if lines.is_empty() {
+            return None;
+        }
         let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", typed(&self.step)) };
         for finding in self.findings.0.iter().filter(|finding| is_separable_by_poses(&finding.effect)) {
             let mut own: Vec<&RivalRow> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).collect();
@@ -163,7 +172,6 @@ impl DiagnosisSummary {
                 "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,
             })
         });
-        let lines = |text: &str| text.lines().map(String::from).collect::<Vec<_>>();
         json!({
             "verdict": v.verdict,
             "statement": v.statement,
@@ -175,8 +183,8 @@ impl DiagnosisSummary {
             "clock": v.clock,
             "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
             "findings": findings.collect::<Vec<_>>(),
-            "withdrawn": v.withdrawn.as_deref().map(lines).unwrap_or_default(),
-            "not_observable": lines(&v.not_observable),
+            "withdrawn": self.said(VerdictTopic::Withdrawn),
+            "not_observable": self.said(VerdictTopic::NotObservable),
             "leftover": {
                 "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
             },
@@ -256,10 +264,10 @@ impl DiagnosisSummary {
                 text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }
         }
-        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+        for line in self.said(VerdictTopic::Withdrawn) {
             text.push_str(&format!("withdrawn: {line}\n"));
         }
-        for line in v.not_observable.lines() {
+        for line in self.said(VerdictTopic::NotObservable) {
             text.push_str(&format!("not observable: {line}\n"));
         }
         text.extend(v.signature.iter().map(|signature| format!("what is left: {signature}\n")));

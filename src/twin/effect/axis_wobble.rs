@@ -1,28 +1,28 @@
 //! A bearing whose axis tilts as the joint turns.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix;
 use crate::truth::ARCSEC;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Tilt of the axis by `amplitude cos(order q + phase)` about one direction across it and `ellipse` times the sine about the other,
-/// seen from the body that carries the joint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AxisWobble {
-    /// From 1.
-    pub joint: usize,
-    /// Periods per turn of the joint.
-    pub order: f64,
-    /// arcsec.
-    pub amplitude_arcsec: f64,
-    /// Second half axis per first: 0 swings in one plane, 1 goes round.
-    #[serde(default)]
-    pub ellipse: f64,
-    /// Phase at zero, deg.
-    #[serde(default)]
-    pub phase_deg: f64,
+effect! {
+    /// Tilt of the axis by `amplitude cos(order q + phase)` about one direction across it and `ellipse` times the sine about the other,
+    /// seen from the body that carries the joint.
+    pub struct AxisWobble {
+        /// From 1.
+        pub joint: usize,
+        /// Periods per turn of the joint.
+        pub order: f64,
+        /// arcsec.
+        pub amplitude_arcsec: f64,
+        /// Second half axis per first: 0 swings in one plane, 1 goes round.
+        #[serde(default)]
+        pub ellipse: f64,
+        /// Phase at zero, deg.
+        #[serde(default)]
+        pub phase_deg: f64,
+    }
+    "axis_wobble" at joint, scaled by amplitude_arcsec,
+    |self| [(format!("amplitude{}", self.order), "arcsec", self.amplitude_arcsec)]
 }
 
 impl Act for AxisWobble {
@@ -45,16 +45,5 @@ impl Act for AxisWobble {
         } else {
             motion.link_end[index - 1] = matrix::times(&motion.link_end[index - 1], &tilt);
         }
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.amplitude_arcsec *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
-        let number = format!("amplitude{}", self.order);
-        vec![true_value("axis_wobble", &tag, place, &number, "arcsec", self.amplitude_arcsec)]
     }
 }

@@ -1,19 +1,19 @@
 //! The foundation tilts under the overturning moment of the whole arm about its foot.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix::{self, Vector};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// A base on elastic anchors: soft about both horizontal axes, stiff about the vertical one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BaseCompliance {
-    /// Tilt about base x and y per moment, rad/Nm.
-    pub rad_per_nm: [f64; 2],
-    /// The point about which it tilts, base frame, mm.
-    #[serde(default)]
-    pub pivot_mm: Vector,
+effect! {
+    /// A base on elastic anchors: soft about both horizontal axes, stiff about the vertical one.
+    pub struct BaseCompliance {
+        /// Tilt about base x and y per moment, rad/Nm.
+        pub rad_per_nm: [f64; 2],
+        /// The point about which it tilts, base frame, mm.
+        #[serde(default)]
+        pub pivot_mm: Vector,
+    }
+    "base_compliance" of "base" "base", scaled by rad_per_nm,
+    |self| [("x", "rad/Nm", self.rad_per_nm[0]), ("y", "rad/Nm", self.rad_per_nm[1])]
 }
 
 impl Act for BaseCompliance {
@@ -23,12 +23,5 @@ impl Act for BaseCompliance {
         let tilt = [self.rad_per_nm[0] * moment[0], self.rad_per_nm[1] * moment[1], 0.0];
         let about = matrix::times(&matrix::turn_by(tilt), &matrix::shift(matrix::scale(pivot, -1.0)));
         motion.base = matrix::times(&motion.base, &matrix::times(&matrix::shift(pivot), &about));
-    }
-    fn scale(&mut self, by: f64) {
-        self.rad_per_nm = self.rad_per_nm.map(|soft| soft * by);
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let value = |axis: &str, rad_per_nm| true_value("base_compliance", "base", "base".into(), axis, "rad/Nm", rad_per_nm);
-        vec![value("x", self.rad_per_nm[0]), value("y", self.rad_per_nm[1])]
     }
 }

@@ -1,6 +1,6 @@
 //! A hose package that pulls on a joint; how hard depends on that joint and on another one, along which it is led.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,27 +15,29 @@ pub enum Pull {
     Bend,
 }
 
-/// Torque of a hose, or the turn by it where the joint's spring is not stated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CableDrag {
-    /// From 1.
-    pub joint: usize,
-    /// The other joint, from 1.
-    pub by: usize,
-    /// Share of the other joint in the bend of the hose.
-    pub lead: f64,
-    /// How it pulls.
-    pub pull: Pull,
-    /// Turn of the joint by the pull, arcsec.
-    #[serde(default)]
-    pub amplitude_arcsec: f64,
-    /// Torque of the pull, Nm: the joint's spring and the motor feel it.
-    #[serde(default)]
-    pub torque_nm: f64,
-    /// Phase at zero, deg.
-    #[serde(default)]
-    pub phase_deg: f64,
+effect! {
+    /// Torque of a hose, or the turn by it where the joint's spring is not stated.
+    pub struct CableDrag {
+        /// From 1.
+        pub joint: usize,
+        /// The other joint, from 1.
+        pub by: usize,
+        /// Share of the other joint in the bend of the hose.
+        pub lead: f64,
+        /// How it pulls.
+        pub pull: Pull,
+        /// Turn of the joint by the pull, arcsec.
+        #[serde(default)]
+        pub amplitude_arcsec: f64,
+        /// Torque of the pull, Nm: the joint's spring and the motor feel it.
+        #[serde(default)]
+        pub torque_nm: f64,
+        /// Phase at zero, deg.
+        #[serde(default)]
+        pub phase_deg: f64,
+    }
+    "cable_drag" at joint, scaled by amplitude_arcsec torque_nm,
+    |self| [("amplitude", "arcsec", self.amplitude_arcsec), ("torque", "Nm", self.torque_nm)]
 }
 
 impl Act for CableDrag {
@@ -49,19 +51,5 @@ impl Act for CableDrag {
         };
         motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * pull;
         motion.load[self.joint - 1] += self.torque_nm * pull;
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.amplitude_arcsec *= by;
-        self.torque_nm *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
-        vec![
-            true_value("cable_drag", &tag, place.clone(), "amplitude", "arcsec", self.amplitude_arcsec),
-            true_value("cable_drag", &tag, place, "torque", "Nm", self.torque_nm),
-        ]
     }
 }

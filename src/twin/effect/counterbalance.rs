@@ -1,6 +1,6 @@
 //! A balancer beside a joint's gear: it takes torque off the gear, and who leaves it out overrates the wind-up.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,19 +14,20 @@ pub enum Balancer {
     Gas,
 }
 
-/// Torque of a balancer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Counterbalance {
-    /// From 1.
-    pub joint: usize,
-    /// What pushes.
-    pub balancer: Balancer,
-    /// The largest torque on the joint, Nm; its sign is that of the turn.
-    pub torque_nm: f64,
-    /// Phase at zero, deg.
-    #[serde(default)]
-    pub phase_deg: f64,
+effect! {
+    /// Torque of a balancer.
+    pub struct Counterbalance {
+        /// From 1.
+        pub joint: usize,
+        /// What pushes.
+        pub balancer: Balancer,
+        /// The largest torque on the joint, Nm; its sign is that of the turn.
+        pub torque_nm: f64,
+        /// Phase at zero, deg.
+        #[serde(default)]
+        pub phase_deg: f64,
+    }
+    "counterbalance" at joint, scaled by torque_nm, |self| [("torque", "Nm", self.torque_nm)]
 }
 
 impl Act for Counterbalance {
@@ -38,15 +39,5 @@ impl Act for Counterbalance {
             Balancer::Gas => 0.75 * sine / (1.25 - cosine),
         };
         motion.load[self.joint - 1] += self.torque_nm * course;
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.torque_nm *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let tag = format!("j{}", self.joint);
-        vec![true_value("counterbalance", &tag, format!("joint {}", self.joint), "torque", "Nm", self.torque_nm)]
     }
 }

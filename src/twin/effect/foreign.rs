@@ -6,7 +6,7 @@ mod variable;
 pub use shape::ForeignShape;
 pub use variable::ForeignVariable;
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, Stated, TrueValue, true_value};
 use crate::matrix::{self, Matrix, Vector};
 use crate::memory::Moment;
 use crate::polar::Polar;
@@ -144,6 +144,9 @@ impl Act for Foreign {
             _ => point,
         }
     }
+}
+
+impl Stated for Foreign {
     fn seat(&self) -> Option<usize> {
         Some(self.seat)
     }

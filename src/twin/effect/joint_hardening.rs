@@ -1,6 +1,6 @@
 //! A gear that is softer under little torque than under much: teeth and rollers that first have to come into full contact.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,18 +19,20 @@ pub enum Curve {
     Square,
 }
 
-/// Wind-up beside the linear one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct JointHardening {
-    /// From 1.
-    pub joint: usize,
-    /// Over the torque.
-    pub curve: Curve,
-    /// arcsec.
-    pub amplitude_arcsec: f64,
-    /// The torque that sets the scale of the curve, Nm.
-    pub scale_nm: f64,
+effect! {
+    /// Wind-up beside the linear one.
+    pub struct JointHardening {
+        /// From 1.
+        pub joint: usize,
+        /// Over the torque.
+        pub curve: Curve,
+        /// arcsec.
+        pub amplitude_arcsec: f64,
+        /// The torque that sets the scale of the curve, Nm.
+        pub scale_nm: f64,
+    }
+    "joint_hardening" at joint, scaled by amplitude_arcsec,
+    |self| [("amplitude", "arcsec", self.amplitude_arcsec), ("scale", "Nm", self.scale_nm)]
 }
 
 impl Act for JointHardening {
@@ -43,18 +45,5 @@ impl Act for JointHardening {
             Curve::Square => -load * load.abs(),
         };
         motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * shape;
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.amplitude_arcsec *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
-        vec![
-            true_value("joint_hardening", &tag, place.clone(), "amplitude", "arcsec", self.amplitude_arcsec),
-            true_value("joint_hardening", &tag, place, "scale", "Nm", self.scale_nm),
-        ]
     }
 }

@@ -1,6 +1,6 @@
 //! Joint positions logged before the arm has settled, or by a clock that is behind: the log holds part of the last move.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, Stated, TrueValue, true_value};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,9 @@ impl Act for JointLogLag {
     fn later(&self) -> f64 {
         1e-3 * self.clock_ms
     }
+}
+
+impl Stated for JointLogLag {
     fn seat(&self) -> Option<usize> {
         self.joint
     }

@@ -1,7 +1,7 @@
 //! A joint that is warm: by its own work, which cools off, or by the arm's temperature, which it follows late. Its zero moves, its
 //! gear's ratio, or its spring softens.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::memory::{self, Moment};
 use crate::truth::ARCSEC;
 use schemars::JsonSchema;
@@ -19,35 +19,46 @@ pub enum Heat {
     Temperature,
 }
 
-/// The joint turns by `w (zero + ratio q + softening torque)`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct JointWarming {
-    /// From 1.
-    pub joint: usize,
-    /// What warms the joint.
-    pub heat: Heat,
-    /// Time constant, s; of temperature 0: at once.
-    #[serde(default)]
-    pub time_s: f64,
-    /// That of the oil, s.
-    #[serde(default = "minute")]
-    pub oil_s: f64,
-    /// Warmth at which it saturates, as `full tanh(w / full)`; 0: it does not.
-    #[serde(default)]
-    pub full: f64,
-    /// Temperature at which nothing is off, C.
-    #[serde(default = "room")]
-    pub reference_c: f64,
-    /// arcsec per unit of warmth.
-    #[serde(default)]
-    pub zero_arcsec: f64,
-    /// arcsec per rad of the joint and unit of warmth.
-    #[serde(default)]
-    pub ratio_arcsec_per_rad: f64,
-    /// rad/Nm per unit of warmth.
-    #[serde(default)]
-    pub softening_rad_per_nm: f64,
+effect! {
+    /// The joint turns by `w (zero + ratio q + softening torque)`.
+    pub struct JointWarming {
+        /// From 1.
+        pub joint: usize,
+        /// What warms the joint.
+        pub heat: Heat,
+        /// Time constant, s; of temperature 0: at once.
+        #[serde(default)]
+        pub time_s: f64,
+        /// That of the oil, s.
+        #[serde(default = "minute")]
+        pub oil_s: f64,
+        /// Warmth at which it saturates, as `full tanh(w / full)`; 0: it does not.
+        #[serde(default)]
+        pub full: f64,
+        /// Temperature at which nothing is off, C.
+        #[serde(default = "room")]
+        pub reference_c: f64,
+        /// arcsec per unit of warmth.
+        #[serde(default)]
+        pub zero_arcsec: f64,
+        /// arcsec per rad of the joint and unit of warmth.
+        #[serde(default)]
+        pub ratio_arcsec_per_rad: f64,
+        /// rad/Nm per unit of warmth.
+        #[serde(default)]
+        pub softening_rad_per_nm: f64,
+    }
+    "joint_warming" at joint, scaled by zero_arcsec ratio_arcsec_per_rad softening_rad_per_nm, |self| {
+        let kelvin = self.heat == Heat::Temperature;
+        let [zero, ratio, softening] =
+            if kelvin { ["arcsec/K", "arcsec/rad/K", "rad/Nm/K"] } else { ["arcsec/rad", "arcsec/rad2", "1/Nm"] };
+        [
+            ("zero", zero, self.zero_arcsec),
+            ("ratio", ratio, self.ratio_arcsec_per_rad),
+            ("softening", softening, self.softening_rad_per_nm),
+            ("time", "s", self.time_s),
+        ]
+    }
 }
 
 fn minute() -> f64 {
@@ -79,28 +90,5 @@ impl Act for JointWarming {
         };
         let held = |w: f64| if self.full > 0.0 { self.full * (w / self.full).tanh() } else { w };
         warmth.into_iter().map(held).collect()
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.zero_arcsec *= by;
-        self.ratio_arcsec_per_rad *= by;
-        self.softening_rad_per_nm *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
-        let value = |name: &str, unit, value| true_value("joint_warming", &tag, place.clone(), name, unit, value);
-        let per = if self.heat == Heat::Temperature {
-            ["arcsec/K", "arcsec/rad/K", "rad/Nm/K"]
-        } else {
-            ["arcsec/rad", "arcsec/rad2", "1/Nm"]
-        };
-        vec![
-            value("zero", per[0], self.zero_arcsec),
-            value("ratio", per[1], self.ratio_arcsec_per_rad),
-            value("softening", per[2], self.softening_rad_per_nm),
-            value("time", "s", self.time_s),
-        ]
     }
 }

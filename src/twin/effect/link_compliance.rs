@@ -3,22 +3,22 @@
 //! Under an end force F and an end moment M a cantilever of length L turns by `M L/EI + F L^2/(2 EI)` and moves by
 //! `M L^2/(2 EI) + F L^3/(3 EI)` across its axis; along its axis a moment twists it by `M L/GJ`.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// The beam between joint N and joint N+1.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LinkCompliance {
-    /// From 1: the body moved by joint N.
-    pub link: usize,
-    /// Rotation of the end per end moment across the beam, L/EI, rad/Nm.
-    pub bending_rad_per_nm: f64,
-    /// Rotation of the end per moment along the beam, L/GJ, rad/Nm.
-    #[serde(default)]
-    pub torsion_rad_per_nm: f64,
+effect! {
+    /// The beam between joint N and joint N+1.
+    pub struct LinkCompliance {
+        /// From 1: the body moved by joint N.
+        pub link: usize,
+        /// Rotation of the end per end moment across the beam, L/EI, rad/Nm.
+        pub bending_rad_per_nm: f64,
+        /// Rotation of the end per moment along the beam, L/GJ, rad/Nm.
+        #[serde(default)]
+        pub torsion_rad_per_nm: f64,
+    }
+    "link_compliance" at link, scaled by bending_rad_per_nm torsion_rad_per_nm,
+    |self| [("bending", "rad/Nm", self.bending_rad_per_nm), ("torsion", "rad/Nm", self.torsion_rad_per_nm)]
 }
 
 impl Act for LinkCompliance {
@@ -44,19 +44,5 @@ impl Act for LinkCompliance {
         let turned = matrix::add(bend, matrix::scale(along, self.torsion_rad_per_nm * twist));
         let end = matrix::times(&matrix::shift(moved), &matrix::turn_by(turned));
         motion.link_end[index] = matrix::times(&motion.link_end[index], &end);
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.link)
-    }
-    fn scale(&mut self, by: f64) {
-        self.bending_rad_per_nm *= by;
-        self.torsion_rad_per_nm *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
-        vec![
-            true_value("link_compliance", &tag, place.clone(), "bending", "rad/Nm", self.bending_rad_per_nm),
-            true_value("link_compliance", &tag, place, "torsion", "rad/Nm", self.torsion_rad_per_nm),
-        ]
     }
 }

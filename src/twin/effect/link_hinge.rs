@@ -1,18 +1,17 @@
 //! A link that gives way at its middle, as a casting with a weak flange does.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// An elastic hinge halfway along the link, soft about both directions across it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LinkHinge {
-    /// From 1: the body moved by joint N.
-    pub link: usize,
-    /// Rotation per moment at the middle, rad/Nm.
-    pub rad_per_nm: f64,
+effect! {
+    /// An elastic hinge halfway along the link, soft about both directions across it.
+    pub struct LinkHinge {
+        /// From 1: the body moved by joint N.
+        pub link: usize,
+        /// Rotation per moment at the middle, rad/Nm.
+        pub rad_per_nm: f64,
+    }
+    "link_compliance" at link, scaled by rad_per_nm, |self| [("middle", "rad/Nm", self.rad_per_nm)]
 }
 
 impl Act for LinkHinge {
@@ -33,15 +32,5 @@ impl Act for LinkHinge {
         let back = matrix::times(&turned, &matrix::shift(half));
         let end = matrix::times(&matrix::shift(matrix::scale(half, -1.0)), &back);
         motion.link_end[index] = matrix::times(&motion.link_end[index], &end);
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.link)
-    }
-    fn scale(&mut self, by: f64) {
-        self.rad_per_nm *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
-        vec![true_value("link_compliance", &tag, place, "middle", "rad/Nm", self.rad_per_nm)]
     }
 }

@@ -1,23 +1,23 @@
 //! A link that is heavier than its description says, or whose centre lies elsewhere.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::arm::Arm;
 use crate::matrix::{self, Vector};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// True mass and centre of a link against the described ones; they show through springs and in the currents.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LinkMass {
-    /// From 1: the body moved by joint N.
-    pub link: usize,
-    /// True mass per described mass, less 1.
-    #[serde(default)]
-    pub mass_share: f64,
-    /// Displacement of its centre at the zero pose along the base axes, mm.
-    #[serde(default)]
-    pub centre_mm: Vector,
+effect! {
+    /// True mass and centre of a link against the described ones; they show through springs and in the currents.
+    pub struct LinkMass {
+        /// From 1: the body moved by joint N.
+        pub link: usize,
+        /// True mass per described mass, less 1.
+        #[serde(default)]
+        pub mass_share: f64,
+        /// Displacement of its centre at the zero pose along the base axes, mm.
+        #[serde(default)]
+        pub centre_mm: Vector,
+    }
+    "link_mass" at link, scaled by mass_share centre_mm,
+    |self| [("mass", "1", self.mass_share), ("centre", "mm", matrix::norm(self.centre_mm))]
 }
 
 impl Act for LinkMass {
@@ -27,19 +27,5 @@ impl Act for LinkMass {
             link.mass *= 1.0 + self.mass_share;
             link.centre = matrix::add(link.centre, matrix::scale(self.centre_mm, 1e-3));
         }
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.link)
-    }
-    fn scale(&mut self, by: f64) {
-        self.mass_share *= by;
-        self.centre_mm = matrix::scale(self.centre_mm, by);
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
-        vec![
-            true_value("link_mass", &tag, place.clone(), "mass", "1", self.mass_share),
-            true_value("link_mass", &tag, place, "centre", "mm", matrix::norm(self.centre_mm)),
-        ]
     }
 }

@@ -45,48 +45,13 @@ mod tracker_sway;
 mod viscous_windup;
 mod zero_shift;
 
-pub use axis_wobble::AxisWobble;
-pub use backlash::Backlash;
-pub use backlash_growth::BacklashGrowth;
-pub use base_compliance::BaseCompliance;
-pub use base_shift::BaseShift;
-pub use base_sway::BaseSway;
-pub use cable_drag::{CableDrag, Pull};
-pub use counterbalance::{Balancer, Counterbalance};
-pub use foreign::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
-pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
-pub use gear_eccentricity::GearEccentricity;
-pub use gear_flank::GearFlank;
-pub use gear_load::GearLoad;
-pub use holding_friction::HoldingFriction;
-pub use joint_bump::JointBump;
-pub use joint_compliance::JointCompliance;
-pub use joint_hardening::{Curve, JointHardening};
-pub use joint_hinge::JointHinge;
-pub use joint_hysteresis::JointHysteresis;
-pub use joint_log_lag::JointLogLag;
-pub use joint_product::JointProduct;
-pub use joint_warming::{Heat, JointWarming};
-pub use link_compliance::LinkCompliance;
-pub use link_hinge::LinkHinge;
-pub use link_mass::LinkMass;
-pub use payload_error::PayloadError;
-pub use presliding::Presliding;
-pub use thermal_bow::ThermalBow;
-pub use thermal_growth::ThermalGrowth;
-pub use thermal_lag::ThermalLag;
-pub use thermal_warm_up::ThermalWarmUp;
-pub use tool_shift::ToolShift;
-pub use tracker_circle::{Circle, TrackerCircle};
-pub use tracker_drift::{Course, TrackerDrift};
-pub use tracker_elevation::TrackerElevation;
-pub use tracker_knock::TrackerKnock;
-pub use tracker_offset::TrackerOffset;
-pub use tracker_refraction::TrackerRefraction;
-pub use tracker_scale::TrackerScale;
-pub use tracker_sway::TrackerSway;
-pub use viscous_windup::ViscousWindup;
-pub use zero_shift::ZeroShift;
+pub use cable_drag::Pull;
+pub use counterbalance::Balancer;
+pub use foreign::{ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
+pub use joint_hardening::Curve;
+pub use joint_warming::Heat;
+pub use tracker_circle::Circle;
+pub use tracker_drift::Course;
 
 use super::arm::{Arm, Posture};
 use super::matrix::Vector;
@@ -114,7 +79,7 @@ pub struct State<'a> {
 }
 
 /// An effect of the twin.
-trait Act {
+trait Act: Stated {
     /// Adds what the effect does in `state` to `motion`.
     fn act(&self, state: &State, motion: &mut Motion);
     /// Changes what the arm is for the whole recording: masses and centres.
@@ -137,6 +102,10 @@ trait Act {
     fn moves_only(&self) -> bool {
         self.later() != 0.0
     }
+}
+
+/// The numbers of an effect.
+trait Stated {
     /// The joint or link that it sits on, from 1, where it has one.
     fn seat(&self) -> Option<usize> {
         None
@@ -147,9 +116,86 @@ trait Act {
     fn truth(&self) -> Vec<TrueValue>;
 }
 
+/// A number, or a vector, that the size of an effect is in proportion to.
+trait Size {
+    fn scale(&mut self, by: f64);
+}
+
+impl Size for f64 {
+    fn scale(&mut self, by: f64) {
+        *self *= by;
+    }
+}
+
+impl<const N: usize> Size for [f64; N] {
+    fn scale(&mut self, by: f64) {
+        self.iter_mut().for_each(|number| *number *= by);
+    }
+}
+
+/// Declares an effect as it is written in YAML: its numbers; its canonical name; its place, which is the joint or link that a number of
+/// it names (with the end of its tag), or a tag and a place; the numbers that its size is in proportion to; its true numbers as name,
+/// unit and value.
+macro_rules! effect {
+    (@type $(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* } $by:ident $($size:ident)+) => {
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        $(#[$meta])*
+        #[serde(deny_unknown_fields)]
+        pub struct $name { $($fields)* }
+        impl $name {
+            fn scale_by(&mut self, $by: f64) {
+                $( $crate::effect::Size::scale(&mut self.$size, $by); )+
+            }
+        }
+    };
+    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
+     $effect:literal at $seat:ident $($end:literal)?, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
+        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+        impl $crate::effect::Stated for $name {
+            fn seat(&self) -> Option<usize> {
+                Some(self.$seat)
+            }
+            fn scale(&mut self, by: f64) {
+                self.scale_by(by);
+            }
+            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
+                let tag = format!(concat!("{}{}", $($end)?), &stringify!($seat)[..1], $me.$seat);
+                $crate::true_value::true_values($effect, &tag, &format!("{} {}", stringify!($seat), $me.$seat), $numbers)
+            }
+        }
+    };
+    ($(#[$meta:meta])* pub struct $name:ident { $($fields:tt)* }
+     $effect:literal of $tag:literal $place:literal, scaled by $($size:ident)+, |$me:ident| $numbers:expr) => {
+        $crate::effect::effect! { @type $(#[$meta])* pub struct $name { $($fields)* } by $($size)+ }
+        impl $crate::effect::Stated for $name {
+            fn scale(&mut self, by: f64) {
+                self.scale_by(by);
+            }
+            fn truth(&$me) -> Vec<$crate::true_value::TrueValue> {
+                $crate::true_value::true_values($effect, $tag, $place, $numbers)
+            }
+        }
+    };
+}
+use effect;
+
+/// A ripple as two amplitudes, as estimators write it.
+fn sine_and_cosine(order: f64, unit: &'static str, amplitude: f64, phase_deg: f64) -> [(String, &'static str, f64); 2] {
+    let (sine, cosine) = phase_deg.to_radians().sin_cos();
+    [(format!("sin{order}"), unit, amplitude * cosine), (format!("cos{order}"), unit, amplitude * sine)]
+}
+
+/// A rigid step, axis by axis.
+fn by_axis(shift_um: Vector, turn_arcsec: Vector) -> impl Iterator<Item = (&'static str, &'static str, f64)> {
+    let names = [("shift_x", "turn_x"), ("shift_y", "turn_y"), ("shift_z", "turn_z")];
+    let axes = names.into_iter().zip(shift_um.into_iter().zip(turn_arcsec));
+    axes.flat_map(|((shift, turn), (moved, turned))| [(shift, "um", moved), (turn, "arcsec", turned)])
+}
+
 /// Declares the list of effects: the name in the YAML is the type's name in snake case.
 macro_rules! physical {
-    ($( $(#[$doc:meta])* $name:ident, )+) => {
+    ($( $(#[$doc:meta])* $file:ident::$name:ident, )+) => {
+        $( pub use $file::$name; )+
         /// One effect with its numbers, written `- gear_cyclic: {joint: 2, ...}`.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
@@ -167,91 +213,91 @@ macro_rules! physical {
 
 physical! {
     /// Wind-up proportional to torque.
-    JointCompliance,
+    joint_compliance::JointCompliance,
     /// Wind-up not proportional to torque.
-    JointHardening,
+    joint_hardening::JointHardening,
     /// Elastic beam between two joints.
-    LinkCompliance,
+    link_compliance::LinkCompliance,
     /// The foundation tilts.
-    BaseCompliance,
+    base_compliance::BaseCompliance,
     /// Error periodic in the joint angle.
-    GearCyclic,
+    gear_cyclic::GearCyclic,
     /// Error periodic in the motor angle.
-    GearMotorCyclic,
+    gear_cyclic::GearMotorCyclic,
     /// Lost motion by direction of approach.
-    Backlash,
+    backlash::Backlash,
     /// Friction that the current shows at rest.
-    HoldingFriction,
+    holding_friction::HoldingFriction,
     /// A link grows with temperature.
-    ThermalGrowth,
+    thermal_growth::ThermalGrowth,
     /// The tracker's frame creeps.
-    TrackerDrift,
+    tracker_drift::TrackerDrift,
     /// The tracker's metre is wrong.
-    TrackerScale,
+    tracker_scale::TrackerScale,
     /// A joint's zero steps at some time.
-    ZeroShift,
+    zero_shift::ZeroShift,
     /// The axis tilts as the joint turns.
-    AxisWobble,
+    axis_wobble::AxisWobble,
     /// The base steps at some time.
-    BaseShift,
+    base_shift::BaseShift,
     /// The base swings slowly.
-    BaseSway,
+    base_sway::BaseSway,
     /// A hose package pulls on a joint.
-    CableDrag,
+    cable_drag::CableDrag,
     /// A balancer carries part of a joint's load.
-    Counterbalance,
+    counterbalance::Counterbalance,
     /// Run-out of an eccentric wheel, not a pure sine.
-    GearEccentricity,
+    gear_eccentricity::GearEccentricity,
     /// The two flanks of the teeth err differently.
-    GearFlank,
+    gear_flank::GearFlank,
     /// A joint is wrong near one angle.
-    JointBump,
+    joint_bump::JointBump,
     /// A joint's error starts at some angle.
-    JointHinge,
+    joint_hinge::JointHinge,
     /// The log of the joints is behind.
-    JointLogLag,
+    joint_log_lag::JointLogLag,
     /// A joint's error is a product of two angles.
-    JointProduct,
+    joint_product::JointProduct,
     /// A link gives way at its middle.
-    LinkHinge,
+    link_hinge::LinkHinge,
     /// A link weighs otherwise than described.
-    LinkMass,
+    link_mass::LinkMass,
     /// The payload is otherwise than declared.
-    PayloadError,
+    payload_error::PayloadError,
     /// A link grows with its own warm-up.
-    ThermalWarmUp,
+    thermal_warm_up::ThermalWarmUp,
     /// The reflector steps at some time.
-    ToolShift,
+    tool_shift::ToolShift,
     /// A joint trails behind while it turns.
-    ViscousWindup,
+    viscous_windup::ViscousWindup,
     /// Lost motion that grows with time.
-    BacklashGrowth,
+    backlash_growth::BacklashGrowth,
     /// Run-out that grows with the load.
-    GearLoad,
+    gear_load::GearLoad,
     /// Wind-up that depends on the direction of approach.
-    JointHysteresis,
+    joint_hysteresis::JointHysteresis,
     /// A joint that is warm by its own work or with the arm.
-    JointWarming,
+    joint_warming::JointWarming,
     /// Lost motion that builds up over a travel.
-    Presliding,
+    presliding::Presliding,
     /// A bent link grows with temperature.
-    ThermalBow,
+    thermal_bow::ThermalBow,
     /// A link grows with a temperature that lags.
-    ThermalLag,
+    thermal_lag::ThermalLag,
     /// The tracker's horizontal circle is off.
-    TrackerCircle,
+    tracker_circle::TrackerCircle,
     /// The tracker's head is off in elevation.
-    TrackerElevation,
+    tracker_elevation::TrackerElevation,
     /// The tracker's stand is knocked.
-    TrackerKnock,
+    tracker_knock::TrackerKnock,
     /// The tracker's ranges are off.
-    TrackerOffset,
+    tracker_offset::TrackerOffset,
     /// The tracker's ranges grow with the air's temperature.
-    TrackerRefraction,
+    tracker_refraction::TrackerRefraction,
     /// The tracker's stand swings slowly.
-    TrackerSway,
+    tracker_sway::TrackerSway,
     /// A drawn shape in one direction of motion.
-    Foreign,
+    foreign::Foreign,
 }
 
 impl Physical {

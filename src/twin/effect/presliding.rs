@@ -3,26 +3,29 @@
 //! P. R. Dahl, 1968: `dz = (s - z) |dq| / travel`, s the direction of motion. Maxwell slip: elastic elements side by side, each of
 //! which slips at its own travel (stop operators of Prandtl and Ishlinskii).
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::memory::Moment;
 use crate::truth::ARCSEC;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// A joint that stops short of where its motor stands, by up to `amplitude` against the last motion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Presliding {
-    /// From 1.
-    pub joint: usize,
-    /// Lost motion when all slides, arcsec: half of the loop.
-    pub amplitude_arcsec: f64,
-    /// Travel of Dahl's law, deg; 0: none.
-    #[serde(default)]
-    pub dahl_deg: f64,
-    /// Travel at which each element of equal force slips, deg; for Maxwell slip.
-    #[serde(default)]
-    pub slip_deg: Vec<f64>,
+effect! {
+    /// A joint that stops short of where its motor stands, by up to `amplitude` against the last motion.
+    pub struct Presliding {
+        /// From 1.
+        pub joint: usize,
+        /// Lost motion when all slides, arcsec: half of the loop.
+        pub amplitude_arcsec: f64,
+        /// Travel of Dahl's law, deg; 0: none.
+        #[serde(default)]
+        pub dahl_deg: f64,
+        /// Travel at which each element of equal force slips, deg; for Maxwell slip.
+        #[serde(default)]
+        pub slip_deg: Vec<f64>,
+    }
+    "presliding" at joint, scaled by amplitude_arcsec, |self| {
+        let slip = self.slip_deg.iter().sum::<f64>() / self.slip_deg.len().max(1) as f64;
+        let travel = if self.dahl_deg > 0.0 { self.dahl_deg } else { slip };
+        [("amplitude", "arcsec", self.amplitude_arcsec), ("travel", "deg", travel)]
+    }
 }
 
 impl Presliding {
@@ -57,23 +60,5 @@ impl Act for Presliding {
     }
     fn remember(&self, past: &[Moment]) -> Vec<f64> {
         if self.dahl_deg > 0.0 { self.dahl(past) } else { self.maxwell(past) }
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
-    fn scale(&mut self, by: f64) {
-        self.amplitude_arcsec *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
-        let travel = if self.dahl_deg > 0.0 {
-            self.dahl_deg
-        } else {
-            self.slip_deg.iter().sum::<f64>() / self.slip_deg.len().max(1) as f64
-        };
-        vec![
-            true_value("presliding", &tag, place.clone(), "amplitude", "arcsec", self.amplitude_arcsec),
-            true_value("presliding", &tag, place, "travel", "deg", travel),
-        ]
     }
 }

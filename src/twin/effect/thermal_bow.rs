@@ -1,22 +1,21 @@
 //! A bent link that grows: how much of the growth reaches the next body depends on how the next joint stands.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Growth of the link along its span by expansion times temperature rise times `cos(q)^power` of the next joint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ThermalBow {
-    /// From 1: the body moved by joint N.
-    pub link: usize,
-    /// um per m and K.
-    pub um_per_m_k: f64,
-    /// Temperature at which the link has its length, C.
-    pub reference_c: f64,
-    /// Of the cosine of the next joint.
-    pub power: i32,
+effect! {
+    /// Growth of the link along its span by expansion times temperature rise times `cos(q)^power` of the next joint.
+    pub struct ThermalBow {
+        /// From 1: the body moved by joint N.
+        pub link: usize,
+        /// um per m and K.
+        pub um_per_m_k: f64,
+        /// Temperature at which the link has its length, C.
+        pub reference_c: f64,
+        /// Of the cosine of the next joint.
+        pub power: i32,
+    }
+    "unknown" at link ".bow", scaled by um_per_m_k, |self| [("expansion", "um/m/K", self.um_per_m_k)]
 }
 
 impl Act for ThermalBow {
@@ -26,15 +25,5 @@ impl Act for ThermalBow {
         let strain = 1e-6 * self.um_per_m_k * (state.row.temperature_c - self.reference_c) * next.cos().powi(self.power);
         let growth = matrix::shift(matrix::scale(state.arm.links[index].span, strain));
         motion.link_end[index] = matrix::times(&growth, &motion.link_end[index]);
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.link)
-    }
-    fn scale(&mut self, by: f64) {
-        self.um_per_m_k *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("l{}.bow", self.link), format!("link {}", self.link));
-        vec![true_value("unknown", &tag, place, "expansion", "um/m/K", self.um_per_m_k)]
     }
 }

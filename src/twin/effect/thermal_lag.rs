@@ -1,26 +1,25 @@
 //! Metal that lags the thermometer: a thick casting is still cold where the sensor on its skin is warm.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix;
 use crate::memory::{self, Moment};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Growth of a link with a temperature that follows the logged one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ThermalLag {
-    /// From 1: the body moved by joint N.
-    pub link: usize,
-    /// Expansion, um per m and K.
-    pub um_per_m_k: f64,
-    /// Temperature at which the link has its length, C.
-    pub reference_c: f64,
-    /// Time constant with which its metal follows, s.
-    pub lag_s: f64,
-    /// That of the core behind the skin, s; half of the growth is the core's. 0: the link is warm throughout.
-    #[serde(default)]
-    pub core_s: f64,
+effect! {
+    /// Growth of a link with a temperature that follows the logged one.
+    pub struct ThermalLag {
+        /// From 1: the body moved by joint N.
+        pub link: usize,
+        /// Expansion, um per m and K.
+        pub um_per_m_k: f64,
+        /// Temperature at which the link has its length, C.
+        pub reference_c: f64,
+        /// Time constant with which its metal follows, s.
+        pub lag_s: f64,
+        /// That of the core behind the skin, s; half of the growth is the core's. 0: the link is warm throughout.
+        #[serde(default)]
+        pub core_s: f64,
+    }
+    "thermal_growth" at link, scaled by um_per_m_k, |self| [("expansion", "um/m/K", self.um_per_m_k), ("lag", "s", self.lag_s)]
 }
 
 impl Act for ThermalLag {
@@ -34,18 +33,5 @@ impl Act for ThermalLag {
         let skin = memory::behind(past, self.lag_s, self.reference_c);
         let core = memory::behind(past, self.lag_s + self.core_s, self.reference_c);
         skin.iter().zip(core).map(|(skin, core)| 0.5 * (skin + core) - self.reference_c).collect()
-    }
-    fn seat(&self) -> Option<usize> {
-        Some(self.link)
-    }
-    fn scale(&mut self, by: f64) {
-        self.um_per_m_k *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
-        vec![
-            true_value("thermal_growth", &tag, place.clone(), "expansion", "um/m/K", self.um_per_m_k),
-            true_value("thermal_growth", &tag, place, "lag", "s", self.lag_s),
-        ]
     }
 }

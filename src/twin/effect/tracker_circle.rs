@@ -1,6 +1,6 @@
 //! The tracker's horizontal circle sits off its axis, or is no circle: its azimuth errs with its azimuth.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect, sine_and_cosine};
 use crate::matrix::Vector;
 use crate::polar::Polar;
 use crate::statics::Row;
@@ -20,17 +20,21 @@ pub enum Circle {
     OffCentre,
 }
 
-/// Error of the azimuth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TrackerCircle {
-    /// Which circle.
-    pub circle: Circle,
-    /// arcsec.
-    pub amplitude_arcsec: f64,
-    /// Phase at zero, deg.
-    #[serde(default)]
-    pub phase_deg: f64,
+effect! {
+    /// Error of the azimuth.
+    pub struct TrackerCircle {
+        /// Which circle.
+        pub circle: Circle,
+        /// arcsec.
+        pub amplitude_arcsec: f64,
+        /// Phase at zero, deg.
+        #[serde(default)]
+        pub phase_deg: f64,
+    }
+    "tracker_circle" of "tracker" "tracker", scaled by amplitude_arcsec, |self| {
+        let order = if self.circle == Circle::Elliptic { 2.0 } else { 1.0 };
+        sine_and_cosine(order, "arcsec", self.amplitude_arcsec, self.phase_deg)
+    }
 }
 
 impl Act for TrackerCircle {
@@ -47,16 +51,5 @@ impl Act for TrackerCircle {
             }
         };
         Polar { azimuth, ..seen }.point()
-    }
-    fn scale(&mut self, by: f64) {
-        self.amplitude_arcsec *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let (sine, cosine) = self.phase_deg.to_radians().sin_cos();
-        let order = if self.circle == Circle::Elliptic { 2 } else { 1 };
-        let value = |name: &str, value| {
-            true_value("tracker_circle", "tracker", "tracker".into(), &format!("{name}{order}"), "arcsec", value)
-        };
-        vec![value("sin", self.amplitude_arcsec * cosine), value("cos", self.amplitude_arcsec * sine)]
     }
 }

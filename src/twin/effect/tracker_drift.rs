@@ -1,6 +1,6 @@
 //! The tracker's stand creeps, and the base frame with it as the tracker sees it.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, by_axis, effect};
 use crate::matrix::{self, Vector};
 use crate::motion::step;
 use schemars::JsonSchema;
@@ -19,21 +19,22 @@ pub enum Course {
     Root,
 }
 
-/// A creep of the tracker's stand.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TrackerDrift {
-    /// Final displacement of what is measured, tracker frame, um.
-    #[serde(default)]
-    pub shift_um: Vector,
-    /// Its final rotation vector about the tracker's origin, arcsec.
-    #[serde(default)]
-    pub turn_arcsec: Vector,
-    /// Time constant, h; for the courses that do not settle, the time at which the motion is as stated.
-    pub settling_h: f64,
-    /// Over time.
-    #[serde(default)]
-    pub course: Course,
+effect! {
+    /// A creep of the tracker's stand.
+    pub struct TrackerDrift {
+        /// Final displacement of what is measured, tracker frame, um.
+        #[serde(default)]
+        pub shift_um: Vector,
+        /// Its final rotation vector about the tracker's origin, arcsec.
+        #[serde(default)]
+        pub turn_arcsec: Vector,
+        /// Time constant, h; for the courses that do not settle, the time at which the motion is as stated.
+        pub settling_h: f64,
+        /// Over time.
+        #[serde(default)]
+        pub course: Course,
+    }
+    "tracker_drift" of "tracker" "tracker", scaled by shift_um turn_arcsec, |self| by_axis(self.shift_um, self.turn_arcsec)
 }
 
 impl Act for TrackerDrift {
@@ -46,21 +47,5 @@ impl Act for TrackerDrift {
         };
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.tracker = matrix::times(&by, &motion.tracker);
-    }
-    fn scale(&mut self, by: f64) {
-        self.shift_um = matrix::scale(self.shift_um, by);
-        self.turn_arcsec = matrix::scale(self.turn_arcsec, by);
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let axes = ["x", "y", "z"].into_iter().enumerate();
-        axes.flat_map(|(index, axis)| {
-            let value =
-                |number: String, unit, value| true_value("tracker_drift", "tracker", "tracker".into(), &number, unit, value);
-            [
-                value(format!("shift_{axis}"), "um", self.shift_um[index]),
-                value(format!("turn_{axis}"), "arcsec", self.turn_arcsec[index]),
-            ]
-        })
-        .collect()
     }
 }

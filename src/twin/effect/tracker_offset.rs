@@ -1,27 +1,28 @@
 //! The tracker's ranges are off: by a dead path or the reflector's constant, by a cyclic part, by the square of the range.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix::Vector;
 use crate::polar::Polar;
 use crate::statics::Row;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// What is added to a range `r`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct TrackerOffset {
-    /// um.
-    pub constant_um: f64,
-    /// Times `sin(2 pi r / wave + phase)`, um: stray light in the meter of distances.
-    pub cyclic_um: f64,
-    /// Length of the cycle, mm.
-    pub wave_mm: f64,
-    /// Phase of the cycle at the instrument, deg.
-    pub phase_deg: f64,
-    /// Times the square of the range, um per m2.
-    pub um_per_m2: f64,
+effect! {
+    /// What is added to a range `r`.
+    #[serde(default)]
+    pub struct TrackerOffset {
+        /// um.
+        pub constant_um: f64,
+        /// Times `sin(2 pi r / wave + phase)`, um: stray light in the meter of distances.
+        pub cyclic_um: f64,
+        /// Length of the cycle, mm.
+        pub wave_mm: f64,
+        /// Phase of the cycle at the instrument, deg.
+        pub phase_deg: f64,
+        /// Times the square of the range, um per m2.
+        pub um_per_m2: f64,
+    }
+    "tracker_offset" of "tracker" "tracker", scaled by constant_um cyclic_um um_per_m2,
+    |self| [("constant", "um", self.constant_um), ("cyclic", "um", self.cyclic_um), ("square", "um/m2", self.um_per_m2)]
 }
 
 impl Default for TrackerOffset {
@@ -37,18 +38,5 @@ impl Act for TrackerOffset {
         let cycle = (TAU * 1e3 * seen.range / self.wave_mm + self.phase_deg.to_radians()).sin();
         let off = self.constant_um + self.cyclic_um * cycle + self.um_per_m2 * seen.range * seen.range;
         Polar { range: seen.range + 1e-6 * off, ..seen }.point()
-    }
-    fn scale(&mut self, by: f64) {
-        self.constant_um *= by;
-        self.cyclic_um *= by;
-        self.um_per_m2 *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let value = |name: &str, unit, value| true_value("tracker_offset", "tracker", "tracker".into(), name, unit, value);
-        vec![
-            value("constant", "um", self.constant_um),
-            value("cyclic", "um", self.cyclic_um),
-            value("square", "um/m2", self.um_per_m2),
-        ]
     }
 }

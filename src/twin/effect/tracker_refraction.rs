@@ -1,29 +1,29 @@
 //! Air changes its index of refraction as it warms: ranges scale with the deviation of its temperature, about 1 um/m/K.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix::{self, Vector};
 use crate::memory::{self, Moment};
 use crate::statics::Row;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Ranges grow with the temperature of the air along the beam.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TrackerRefraction {
-    /// um per m and K.
-    pub um_per_m_k: f64,
-    /// Temperature for which the tracker corrects, C.
-    pub reference_c: f64,
-    /// Time constant with which the air follows the logged temperature, s; 0: at once.
-    #[serde(default)]
-    pub lag_s: f64,
-    /// The air warms by so much on its own, K, whatever is logged; 0: it follows the log.
-    #[serde(default)]
-    pub own_rise_k: f64,
-    /// Time constant of that, h.
-    #[serde(default = "one")]
-    pub warm_up_h: f64,
+effect! {
+    /// Ranges grow with the temperature of the air along the beam.
+    pub struct TrackerRefraction {
+        /// um per m and K.
+        pub um_per_m_k: f64,
+        /// Temperature for which the tracker corrects, C.
+        pub reference_c: f64,
+        /// Time constant with which the air follows the logged temperature, s; 0: at once.
+        #[serde(default)]
+        pub lag_s: f64,
+        /// The air warms by so much on its own, K, whatever is logged; 0: it follows the log.
+        #[serde(default)]
+        pub own_rise_k: f64,
+        /// Time constant of that, h.
+        #[serde(default = "one")]
+        pub warm_up_h: f64,
+    }
+    "tracker_refraction" of "tracker" "tracker", scaled by um_per_m_k,
+    |self| [("scale", "um/m/K", self.um_per_m_k), ("lag", "s", self.lag_s)]
 }
 
 fn one() -> f64 {
@@ -42,12 +42,5 @@ impl Act for TrackerRefraction {
     }
     fn sight(&self, _row: &Row, memory: f64, point: Vector) -> Vector {
         matrix::scale(point, 1.0 + 1e-6 * self.um_per_m_k * memory)
-    }
-    fn scale(&mut self, by: f64) {
-        self.um_per_m_k *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let value = |name: &str, unit, value| true_value("tracker_refraction", "tracker", "tracker".into(), name, unit, value);
-        vec![value("scale", "um/m/K", self.um_per_m_k), value("lag", "s", self.lag_s)]
     }
 }

@@ -1,30 +1,30 @@
 //! The tracker's stand swings slowly, as a tripod does in the sun or beside a machine: an effect that no list expects.
 
-use super::{Act, Motion, State, TrueValue, true_value};
+use super::{Act, Motion, State, effect};
 use crate::matrix::{self, Vector};
 use crate::motion::step;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// A sine of time in one direction of motion of what is measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TrackerSway {
-    /// Displacement at the peak, tracker frame, um.
-    #[serde(default)]
-    pub shift_um: Vector,
-    /// Rotation vector at the peak about the tracker's origin, arcsec.
-    #[serde(default)]
-    pub turn_arcsec: Vector,
-    /// s.
-    pub period_s: f64,
-    /// Phase at zero, deg.
-    #[serde(default)]
-    pub phase_deg: f64,
-    /// Time in which the swing fades to 37 %, s; 0: never.
-    #[serde(default)]
-    pub fading_s: f64,
+effect! {
+    /// A sine of time in one direction of motion of what is measured.
+    pub struct TrackerSway {
+        /// Displacement at the peak, tracker frame, um.
+        #[serde(default)]
+        pub shift_um: Vector,
+        /// Rotation vector at the peak about the tracker's origin, arcsec.
+        #[serde(default)]
+        pub turn_arcsec: Vector,
+        /// s.
+        pub period_s: f64,
+        /// Phase at zero, deg.
+        #[serde(default)]
+        pub phase_deg: f64,
+        /// Time in which the swing fades to 37 %, s; 0: never.
+        #[serde(default)]
+        pub fading_s: f64,
+    }
+    "unknown" of "tracker_sway" "tracker", scaled by shift_um turn_arcsec,
+    |self| [("shift", "um", matrix::norm(self.shift_um)), ("turn", "arcsec", matrix::norm(self.turn_arcsec)), ("period", "s", self.period_s)]
 }
 
 impl Act for TrackerSway {
@@ -34,17 +34,5 @@ impl Act for TrackerSway {
         let share = left * (TAU * time / self.period_s + self.phase_deg.to_radians()).sin();
         let by = step(self.shift_um, self.turn_arcsec, share);
         motion.tracker = matrix::times(&by, &motion.tracker);
-    }
-    fn scale(&mut self, by: f64) {
-        self.shift_um = matrix::scale(self.shift_um, by);
-        self.turn_arcsec = matrix::scale(self.turn_arcsec, by);
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let value = |number: &str, unit, value| true_value("unknown", "tracker_sway", "tracker".into(), number, unit, value);
-        vec![
-            value("shift", "um", matrix::norm(self.shift_um)),
-            value("turn", "arcsec", matrix::norm(self.turn_arcsec)),
-            value("period", "s", self.period_s),
-        ]
     }
 }

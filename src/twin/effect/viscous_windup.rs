@@ -1,20 +1,19 @@
 //! Friction of grease and seals that grows with speed winds a gear up: the joint's output trails behind its motor.
 
-use super::{Act, Motion, State, TrueValue, true_value};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::{Act, Motion, State, effect};
 
-/// The output of a joint trails behind its motor while it turns.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ViscousWindup {
-    /// From 1.
-    pub joint: usize,
-    /// Arcsec for each deg/s (um for each mm/s of a prismatic joint), at 20 deg/s.
-    pub arcsec_per_deg_s: f64,
-    /// Friction grows with this power of the speed: 1 for oil, less for grease.
-    #[serde(default = "one")]
-    pub exponent: f64,
+effect! {
+    /// The output of a joint trails behind its motor while it turns.
+    pub struct ViscousWindup {
+        /// From 1.
+        pub joint: usize,
+        /// Arcsec for each deg/s (um for each mm/s of a prismatic joint), at 20 deg/s.
+        pub arcsec_per_deg_s: f64,
+        /// Friction grows with this power of the speed: 1 for oil, less for grease.
+        #[serde(default = "one")]
+        pub exponent: f64,
+    }
+    "viscous_windup" at joint, scaled by arcsec_per_deg_s, |self| [("trail", "rad/(rad/s)", self.trail())]
 }
 
 fn one() -> f64 {
@@ -39,17 +38,7 @@ impl Act for ViscousWindup {
             motion.joint[self.joint - 1] -= self.trail() * friction;
         }
     }
-    fn seat(&self) -> Option<usize> {
-        Some(self.joint)
-    }
     fn moves_only(&self) -> bool {
         true
-    }
-    fn scale(&mut self, by: f64) {
-        self.arcsec_per_deg_s *= by;
-    }
-    fn truth(&self) -> Vec<TrueValue> {
-        let place = format!("joint {}", self.joint);
-        vec![true_value("viscous_windup", &format!("j{}", self.joint), place, "trail", "rad/(rad/s)", self.trail())]
     }
 }

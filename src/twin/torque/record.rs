@@ -10,7 +10,7 @@ const FINE: f64 = 500.0;
 /// s between two stretches, in which nothing is recorded.
 const PAUSE: f64 = 2.0;
 /// Of the lasting part of noise, from row to row.
-pub(super) const LASTS: f64 = 0.95;
+pub(super) const AR1_COEFFICIENT: f64 = 0.95;
 
 /// Rows of a recording, without noise or with it; per-joint lists are row-major.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -126,7 +126,8 @@ impl TorqueCase {
         for (state, torque) in rows.state.iter().zip(rows.torque.chunks_exact(n)) {
             angles.extend(state.q.iter().map(|q| (q.to_degrees() / self.encoder_deg).round() * self.encoder_deg));
             for j in 0..n {
-                lasting[j] = LASTS * lasting[j] + (1.0 - LASTS * LASTS).sqrt() * self.lasting[j] * noise.normal();
+                lasting[j] = AR1_COEFFICIENT * lasting[j]
+                    + (1.0 - AR1_COEFFICIENT * AR1_COEFFICIENT).sqrt() * self.lasting[j] * noise.normal();
                 let stated = (torque[j] + lasting[j] + self.white[j] * noise.normal()) / self.per_unit[j];
                 signal.push((stated / self.resolution).round() * self.resolution);
             }

@@ -3,7 +3,7 @@
 
 use super::draw::TorqueCase;
 use super::law::{Fall, Law, Moment};
-use super::record::{LASTS, TorqueRows};
+use super::record::{AR1_COEFFICIENT, TorqueRows};
 use super::rigid::Machine;
 
 /// Rows that are averaged into one: as a low-pass does.
@@ -80,7 +80,7 @@ impl TorqueCase {
 impl<'a> Columns<'a> {
     fn new(case: &'a TorqueCase, rows: &'a TorqueRows) -> Self {
         // Lasting noise counts as one value in so many averaged rows.
-        let lasts = LASTS.powi(AVERAGED as i32);
+        let lasts = AR1_COEFFICIENT.powi(AVERAGED as i32);
         let lasting = (1.0 + lasts) / (1.0 - lasts);
         let weight = case.white.iter().zip(&case.lasting);
         let weight = weight.map(|(white, own)| (white * white / AVERAGED as f64 + own * own * lasting).sqrt().recip());

@@ -23,7 +23,7 @@ impl Truth {
         let home = *robot.home();
         let offset = Vector3::from(THREE[0].1) * 1e-3;
         let rotation = home.rotation * Pose::from_rotation_vector(askew, Vector3::zeros()).rotation;
-        let target = Target { name: String::new(), seat: Pose::new(rotation, home.point(&offset)), oriented: true };
+        let target = Target { name: String::new(), mounting: Pose::new(rotation, home.point(&offset)), oriented: true };
         let anchor = Anchor::point("", Vector3::new(4.6, -2.5, 0.8));
         let robot = robot.measured_by(MeasurementSetup { targets: vec![target], anchors: vec![anchor] });
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.0, 0.0));
@@ -66,10 +66,10 @@ impl Truth {
 
     /// How the target is turned in every row, by differences of points.
     fn rotations(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
-        let seat = self.model.robot.setup().targets[0].seat;
+        let seat = self.model.robot.setup().targets[0].mounting;
         let beside = [0, 1, 2].map(|axis: usize| {
             let mut setup = self.model.robot.setup().clone();
-            setup.targets[0].seat.translation += seat.rotation.column(axis) * 0.5;
+            setup.targets[0].mounting.translation += seat.rotation.column(axis) * 0.5;
             Model { robot: self.model.robot.clone().measured_by(setup), ..self.model.clone() }.predict(data)
         });
         let rows = 0..data.rows();

@@ -41,7 +41,7 @@ pub fn text() -> String {
 /// What separates a cause from the others that the data do not exclude.
 fn next(cause: &dyn Cause) -> String {
     let poses = "poses that `calib poses --run HEAD --separate` proposes";
-    match (cause.measure(), cause.is_separable_by_poses()) {
+    match (cause.about().measure, cause.about().separable_by_poses) {
         (Some(measure), true) => format!("{poses}; {}", measure.advice),
         (Some(measure), false) => measure.advice.to_string(),
         (None, true) => poses.to_string(),
@@ -51,8 +51,8 @@ fn next(cause: &dyn Cause) -> String {
 
 fn found_by(cause: &dyn Cause) -> String {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    let identified = cause.whole(&setting).is_some();
-    let stays = if cause.is_of_the_measurement() { "; it belongs to the measurement and is not compensated" } else { "" };
+    let identified = cause.arm_effect(&setting).is_some();
+    let stays = if cause.about().of_the_measurement { "; it belongs to the measurement and is not compensated" } else { "" };
     format!("{}{stays}", if identified { "`identify`; `diagnose` has it in its base model or names it" } else { "`diagnose`" })
 }
 

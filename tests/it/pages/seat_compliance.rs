@@ -14,6 +14,7 @@ impl Cause for SeatCompliance {
             size: "10 to 200 um",
             confounded: "payload_error, joint_compliance of the last joints",
             needs: "rows with and without the payload",
+            ..CauseDescription::PLAIN
         }
     }
 

@@ -75,7 +75,7 @@ pub fn signatures() -> BTreeMap<&'static str, (String, String)> {
         let chosen = forms.iter().find(|form| form.place() == Place::Joint(JOINT)).or(forms.first());
         let effect: Box<dyn Effect> = match chosen {
             Some(form) => Box::new(form.clone()),
-            None => cause.whole(&setting())?,
+            None => cause.arm_effect(&setting())?,
         };
         let place = chosen.map_or(Place::Joint(JOINT), |form| form.place());
         Some((cause.name(), (place.to_string(), line(&robot, effect, place)?)))

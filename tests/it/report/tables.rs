@@ -161,12 +161,15 @@ fn verdict() -> Verdict {
         repeatability_rad: 2e-6,
         repeats: 0,
         points: 300,
-        not_observable: "temperature: none was recorded\ntracker_scale: <measure> a scale bar".into(),
         signature: None,
-        next_measurements: None,
-        withdrawn: Some("payload_error at tool: <smaller> than its own uncertainty".into()),
         clock: Some("s".into()),
     }])
+}
+
+fn sentences() -> VerdictSentences {
+    let unseen = ["temperature: none was recorded", "tracker_scale: <measure> a scale bar"].map(String::from);
+    let withdrawn = ["payload_error at tool: <smaller> than its own uncertainty".to_string()];
+    VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen), (VerdictTopic::Withdrawn, &withdrawn)])
 }
 
 fn findings() -> Findings {
@@ -410,6 +413,7 @@ pub fn tables(name: &str) -> ReportReads {
         corrections: corrections(),
         models: Vec::new(),
         verdict: diagnosed(verdict()),
+        sentences: diagnosed(sentences()),
         findings: diagnosed(findings()),
         finding_numbers: diagnosed(numbers()),
         rivals: diagnosed(rivals()),

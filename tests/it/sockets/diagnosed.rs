@@ -5,7 +5,7 @@ use super::{fixture, socket, touched, touched_with, truth};
 use crate::desk::{self, Desk};
 use calib::description::RobotDescription;
 use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{Findings, Recording, Robot, Verdict, VerdictRow};
+use calib::table::{Findings, Recording, Robot, Verdict, VerdictRow, VerdictSentences, VerdictTopic};
 use calib::twin::touch::Fixture;
 use calib::twin::truth::TrueRobot;
 
@@ -17,6 +17,12 @@ fn cell(points: usize) -> Vec<Fixture> {
 
 /// Causes by place, the verdict, and all that was warned of.
 fn diagnosed(robot: &RobotDescription, recording: Recording) -> (Vec<String>, VerdictRow, String) {
+    let (named, verdict, _, warnings) = diagnosed_with_sentences(robot, recording);
+    (named, verdict, warnings)
+}
+
+/// The same, with what the data cannot show.
+fn diagnosed_with_sentences(robot: &RobotDescription, recording: Recording) -> (Vec<String>, VerdictRow, String, String) {
     let split = all(&recording);
     let desk = Desk::default();
     let stage: Diagnose = serde_saphyr::from_str("{}").expect("every setting has a default");
@@ -25,17 +31,19 @@ fn diagnosed(robot: &RobotDescription, recording: Recording) -> (Vec<String>, Ve
     let verdict = desk::table::<Verdict>(&tables).remove(0).0.remove(0);
     let named = findings.iter().map(|finding| format!("{} at {}", finding.effect, finding.place)).collect();
     let warnings = desk.warnings.into_inner().unwrap().join("\n");
-    (named, verdict, warnings)
+    let sentences = desk::table::<VerdictSentences>(&tables).remove(0);
+    let unseen = sentences.about(&verdict.step, VerdictTopic::NotObservable).join("\n");
+    (named, verdict, unseen, warnings)
 }
 
 #[test]
 fn nothing_is_found_in_a_clean_recording_and_what_cannot_be_known_is_said() {
     let robot = fixture::seven();
-    let (named, verdict, warnings) = diagnosed(&robot, touched(&robot, &truth(&robot, 31), &cell(30), 31));
+    let (named, verdict, unseen, warnings) = diagnosed_with_sentences(&robot, touched(&robot, &truth(&robot, 31), &cell(30), 31));
     assert!(named.is_empty(), "{named:?}");
     assert_eq!(verdict.verdict, "nothing_missing", "{:?}", verdict.statement);
     for expected in ["anything below the repeatability of closing", "scale of the arm", "place of the base"] {
-        assert!(verdict.not_observable.contains(expected), "{}", verdict.not_observable);
+        assert!(unseen.contains(expected), "{unseen}");
     }
     assert!(!warnings.contains("do not close") && !warnings.contains("sits elsewhere"), "{warnings}");
 }

@@ -12,7 +12,7 @@ pub(super) struct NamedVariable {
     pub name: String,
     pub is_angle: bool,
     /// Whether it is the position of a joint that slides.
-    pub is_length: bool,
+    pub is_prismatic: bool,
     /// Over the fitted rows, rounded outwards; of angles a turn to either side.
     pub range: [f64; 2],
 }
@@ -21,10 +21,10 @@ impl NamedVariable {
     /// Of a law at a joint; `None` of one that has no name in formulas. `slides`: which joints do not turn.
     pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2], slides: impl Fn(usize) -> bool) -> Option<Self> {
         let name = variable.in_formulas(joint)?;
-        let is_length = matches!(variable, Variable::Angle { joint } if slides(joint));
-        let is_angle = matches!(variable, Variable::Angle { .. }) && !is_length;
+        let is_prismatic = matches!(variable, Variable::Angle { joint } if slides(joint));
+        let is_angle = matches!(variable, Variable::Angle { .. }) && !is_prismatic;
         let range = if is_angle { [-TURN, TURN] } else { [rounded(low, f64::floor), rounded(high, f64::ceil)] };
-        (range[0] < range[1]).then_some(Self { name, is_angle, is_length, range })
+        (range[0] < range[1]).then_some(Self { name, is_angle, is_prismatic, range })
     }
 }
 
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn a_rail_errs_by_millimetres_over_its_own_travel() {
         let rail = NamedVariable::of(Variable::Angle { joint: 0 }, 0, [0.012, 1.987], |joint| joint == 0).expect("a name");
-        assert_eq!((rail.name.as_str(), rail.is_angle, rail.is_length, rail.range), ("q", false, true, [0.01, 2.0]));
+        assert_eq!((rail.name.as_str(), rail.is_angle, rail.is_prismatic, rail.range), ("q", false, true, [0.01, 2.0]));
         let all = declarations("joint 1", "mm", &[rail]);
         assert!(all.iter().any(|declaration| declaration.name == "bump_of_q"));
         for declaration in all {

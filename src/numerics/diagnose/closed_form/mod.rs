@@ -179,7 +179,7 @@ fn unit(name: &str, variables: &[NamedVariable]) -> (&'static str, f64) {
         "order" if all(|variable| variable.is_angle) => ("1", 1.0),
         "order" => ("SI", 1.0),
         _ if all(|variable| variable.is_angle) => ("rad", 1.0),
-        _ if all(|variable| variable.is_length) => ("mm", 1e3),
+        _ if all(|variable| variable.is_prismatic) => ("mm", 1e3),
         _ => ("SI", 1.0),
     }
 }

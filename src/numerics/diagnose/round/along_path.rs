@@ -27,7 +27,7 @@ pub(crate) struct CorrelationChange {
 /// Whether neighbours in time are neighbours in pose.
 pub(super) fn follow_a_path(data: &Measurements, rows: &[usize]) -> bool {
     let mut measured: Vec<usize> = rows.to_vec();
-    measured.sort_by_key(|row| data.place(*row));
+    measured.sort_by_key(|row| data.rank_in_time(*row));
     let apart = |a: usize, b: usize| data.q(a).iter().zip(data.q(b)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     let mut steps: Vec<f64> = measured.windows(2).map(|pair| apart(pair[0], pair[1])).filter(|step| *step > 0.0).collect();
     // Rows half of the recording apart stand for any two.

@@ -20,7 +20,7 @@ pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]
     let effects: Vec<Box<dyn Effect>> = identified()
         .filter(|cause| BASE.contains(&cause.name()) || (cause.name() == names::ANCHOR && !robot.setup().anchors.is_empty()))
         .filter(|cause| !without.iter().any(|name| name == cause.name()))
-        .filter_map(|cause| cause.whole(&setting))
+        .filter_map(|cause| cause.arm_effect(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects))

@@ -110,7 +110,7 @@ impl RepeatPairs {
         let repeated = poses.repeated().chain(&others);
         let pairs = repeated.flat_map(|rows| rows.windows(2).map(|pair| [pair[0], pair[1]]));
         let at_once = |[a, b]: &[usize; 2]| {
-            let [from, to] = [data.place(*a), data.place(*b)];
+            let [from, to] = [data.rank_in_time(*a), data.rank_in_time(*b)];
             let mut between = (from.min(to) + 1..from.max(to)).map(|place| data.at_place(place));
             between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
         };
@@ -152,7 +152,7 @@ impl RepeatPairs {
 
 /// The rows of a pose that measured other than whole points of one target, from one anchor, where there are several.
 fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
-    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.points.axes(*row);
+    let measured = |row: &usize| !data.has_point(*row) && values(data, *row) > data.points.axes(*row);
     let same = |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
     let mut out: Vec<Vec<usize>> = Vec::new();
     for pose in poses.all() {

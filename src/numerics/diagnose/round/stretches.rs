@@ -33,11 +33,11 @@ pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f
         return (0..rows.len()).map(|i| i / stretch).collect();
     }
     let mut measured: Vec<usize> = (0..rows.len()).collect();
-    measured.sort_by_key(|i| data.place(rows[*i]));
+    measured.sort_by_key(|i| data.rank_in_time(rows[*i]));
     let mut out = vec![0; rows.len()];
     for pair in measured.windows(2) {
         let (before, row) = (rows[pair[0]], rows[pair[1]]);
-        let new = !data.same_pose(before, row) && data.place(data.stop(row)) > data.place(before);
+        let new = !data.same_pose(before, row) && data.rank_in_time(data.stop(row)) > data.rank_in_time(before);
         out[pair[1]] = out[pair[0]] + usize::from(new);
     }
     out

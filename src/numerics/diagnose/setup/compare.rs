@@ -44,7 +44,7 @@ struct Try {
 impl<'a> AsStated<'a> {
     pub fn of(question: &'a Question<'a>) -> Self {
         let data = question.data;
-        let rows: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row)).collect();
+        let rows: Vec<usize> = (0..data.rows()).filter(|row| data.has_point(*row)).collect();
         let sample = sampled(question.fit);
         let judges = sample.iter().filter_map(|row| rows.binary_search(row).ok()).collect();
         let pairs = PointPairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));

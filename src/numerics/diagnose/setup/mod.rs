@@ -29,7 +29,7 @@ struct WholePoints {
 
 impl WholePoints {
     fn of(question: &Question) -> Self {
-        let whole = |rows: &[usize]| rows.iter().copied().filter(|row| question.data.whole(*row)).collect();
+        let whole = |rows: &[usize]| rows.iter().copied().filter(|row| question.data.has_point(*row)).collect();
         Self { fit: whole(question.fit), validate: whole(question.validate) }
     }
 

@@ -5,7 +5,7 @@ use super::last_round::LastRound;
 use super::not_observable::{next, not_observable, not_tried};
 use super::unseen::unseen;
 use crate::criteria::judge::FOLDS;
-use crate::criteria::noise::{LOUD, REPEATS, TOO_LOUD};
+use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE, REPEATS};
 use crate::criteria::search::SIGNIFICANT;
 use crate::criteria::words::{NAMELESS, NOT_NOISE, REST, WEAK};
 use crate::diagnose::closed_form::FormulaSearch;
@@ -31,9 +31,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
     let structured = last.last <= *SIGNIFICANT || lacking;
-    let something_left = structured && misfit.chi_square > *LOUD || misfit.chi_square > *TOO_LOUD || misfit.not_carried.is_some();
+    let something_left = structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE
+        || misfit.chi_square > *MAX_CHI_SQUARE
+        || misfit.not_carried.is_some();
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
-    let above_stated = is_stated && misfit.beyond_stated > *LOUD;
+    let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
         // What lasts from point to point may be the air, and may be a cause that follows time.
         VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => VerdictKind::Unexplained,

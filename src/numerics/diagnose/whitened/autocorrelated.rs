@@ -12,7 +12,7 @@ pub(crate) struct AutocorrelatedNoise {
 }
 
 /// Tried values, from short to long.
-const LASTS: [f64; 10] = [0.4, 0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.96, 0.98, 0.99];
+const AR1_COEFFICIENTS: [f64; 10] = [0.4, 0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.96, 0.98, 0.99];
 const SHARES: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 impl AutocorrelatedNoise {
@@ -21,7 +21,8 @@ impl AutocorrelatedNoise {
 
     /// All that are tried, white noise (`None`) first.
     pub fn all() -> impl Iterator<Item = Option<Self>> {
-        let some = LASTS.into_iter().flat_map(|correlation| SHARES.into_iter().map(move |share| Self { correlation, share }));
+        let some =
+            AR1_COEFFICIENTS.into_iter().flat_map(|correlation| SHARES.into_iter().map(move |share| Self { correlation, share }));
         std::iter::once(None).chain(some.map(Some))
     }
 

@@ -1,35 +1,25 @@
 //! Friction that is greater in one direction of motion.
 
-use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, at_each_joint, fill, plain};
+use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Friction that is greater in one direction of motion.
 pub(super) struct Asymmetric;
 
 impl TorqueCause for Asymmetric {
-    fn name(&self) -> &'static str {
-        "asymmetric_friction"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "asymmetric_friction",
+            coefficients: &[("asymmetry", "Nm")],
+            of_sign: true,
+            rich: true,
+            modifies: &[COULOMB],
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint(&Asymmetric, scene, 1)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        6.0
-    }
-
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
-    }
-
-    fn modifies(&self) -> &'static [&'static str] {
-        &[COULOMB]
-    }
-
-    fn is_of_sign(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
@@ -39,14 +29,6 @@ impl TorqueCause for Asymmetric {
 
     fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {
         Some(sign.max(0.0))
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("asymmetry", "Nm")]
-    }
-
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("asymmetry", fitted[0], "Nm")]
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

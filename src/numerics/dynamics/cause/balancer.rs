@@ -1,9 +1,8 @@
 //! A balancer at the joint that arms balance: its torque swings with the joint's angle.
 
 use super::spring::{BALANCED, SPRING_BALANCE_NAME};
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Shape: least and greatest angle of the joint, rad. Between two points a spring's lever is a sine of the angle: one wave a turn; where its force grows with its stroke (gas, a bent lever)
 /// a second wave and a constant. A ripple of one wave a turn is the same torque: there it is a balancer, with the ripple as its rival.
@@ -21,8 +20,13 @@ fn waves(q: f64) -> [f64; 5] {
 }
 
 impl TorqueCause for Balancer {
-    fn name(&self) -> &'static str {
-        SPRING_BALANCE_NAME
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: SPRING_BALANCE_NAME,
+            coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")],
+            of_angle: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -47,20 +51,8 @@ impl TorqueCause for Balancer {
         square(values.len()) >= LEAST_WHOLE * LEAST_WHOLE * square(values.len().min(WIDTHS[0]))
     }
 
-    fn is_of_angle(&self) -> bool {
-        true
-    }
-
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.len() == 2
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")]
-    }
-
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        self.coefficients().iter().zip(fitted).map(|((name, unit), number)| plain(name, *number, unit)).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,6 +1,6 @@
 //! A joint that swings: its torque is that of the rigid arm behind a resonance.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
@@ -21,18 +21,20 @@ const HERTZ: [f64; 8] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0];
 const DAMPING: [f64; 2] = [0.05, 0.15];
 
 impl TorqueCause for Elasticity {
-    fn name(&self) -> &'static str {
-        "joint_elasticity"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "joint_elasticity",
+            coefficients: &[("share", "1"), ("transmitted_damping", "1")],
+            price: 8.0,
+            of_rigid: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let shapes: Vec<[f64; 2]> = HERTZ.iter().flat_map(|hertz| DAMPING.map(|damping| [*hertz, damping])).collect();
         let shapes: Vec<&[f64]> = shapes.iter().map(|shape| &shape[..]).collect();
         at_each_joint_with(&Elasticity, scene, WIDTH, &shapes)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        8.0
     }
 
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {
@@ -42,10 +44,6 @@ impl TorqueCause for Elasticity {
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.shape == [5.0, 0.05] || form.shape == [8.5, 0.05]
-    }
-
-    fn is_of_rigid(&self) -> bool {
-        true
     }
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -77,10 +75,6 @@ impl TorqueCause for Elasticity {
                 out[row] = output - rigid * input;
             }
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("share", "1"), ("transmitted_damping", "1")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

@@ -1,6 +1,6 @@
 //! A base that does not stand as declared.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, shape};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, shape};
 use crate::dynamics::scene::{DynamicScene, GRAVITY};
 use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
@@ -9,8 +9,16 @@ use crate::effect::Place;
 pub(super) struct GravityDirection;
 
 impl TorqueCause for GravityDirection {
-    fn name(&self) -> &'static str {
-        "gravity_direction"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "gravity_direction",
+            coefficients: &[("side_x", "1"), ("side_y", "1")],
+            price: 4.0,
+            rich: true,
+            inertial: true,
+            of_rigid: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -18,28 +26,8 @@ impl TorqueCause for GravityDirection {
         if scene.declared.is_some() { vec![form] } else { Vec::new() }
     }
 
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        4.0
-    }
-
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
-    }
-
-    fn is_inertial(&self) -> bool {
-        true
-    }
-
-    fn is_of_rigid(&self) -> bool {
-        true
-    }
-
     fn write(&self, _form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         out.copy_from_slice(&scene.sideways[column][joint]);
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("side_x", "1"), ("side_y", "1")]
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

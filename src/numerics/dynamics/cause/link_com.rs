@@ -1,6 +1,6 @@
 //! A link whose centre of mass is elsewhere.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -14,20 +14,12 @@ const WIDTH: usize = 3;
 const FARTHEST: f64 = 0.2;
 
 impl TorqueCause for WrongLinkCentre {
-    fn name(&self) -> &'static str {
-        "link_com"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: "link_com", price: 8.0, inertial: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&WrongLinkCentre, scene, WIDTH)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        8.0
-    }
-
-    fn is_inertial(&self) -> bool {
-        true
     }
 
     fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {

@@ -1,6 +1,6 @@
 //! A link whose inertia is not the declared one.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -12,20 +12,12 @@ pub(super) struct WrongLinkInertia;
 const WIDTH: usize = 6;
 
 impl TorqueCause for WrongLinkInertia {
-    fn name(&self) -> &'static str {
-        "link_inertia"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: "link_inertia", price: 8.0, inertial: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&WrongLinkInertia, scene, WIDTH)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        8.0
-    }
-
-    fn is_inertial(&self) -> bool {
-        true
     }
 
     fn inertial(&self, form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {

@@ -1,6 +1,6 @@
 //! A link that is heavier or lighter than declared.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -15,20 +15,12 @@ const LEAST: f64 = -0.7;
 const MOST: f64 = 1.0;
 
 impl TorqueCause for HeavierLink {
-    fn name(&self) -> &'static str {
-        "link_mass"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: "link_mass", inertial: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&HeavierLink, scene, WIDTH)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        6.0
-    }
-
-    fn is_inertial(&self) -> bool {
-        true
     }
 
     fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {

@@ -85,15 +85,63 @@ pub(super) struct ShapeSpan {
     pub usual: Option<f64>,
 }
 
+/// What a cause is, whatever its form.
+pub(super) struct TorqueCauseDescription {
+    /// Canonical.
+    pub name: &'static str,
+    /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
+    pub coefficients: &'static [CoefficientName],
+    /// -2 ln of how common it is beside a common one.
+    pub price: f64,
+    /// Frictions of the same joint that it modifies, and without which it is none.
+    pub modifies: &'static [&'static str],
+    /// Whether it is part of the rich model, which noise is taken from.
+    pub rich: bool,
+    /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
+    pub positive: bool,
+    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
+    pub of_angle: bool,
+    /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
+    pub inertial: bool,
+    /// Whether its columns are the same at whatever joint it acts.
+    pub alike_at_joints: bool,
+    /// Whether its columns are made of the rigid torque.
+    pub of_rigid: bool,
+    /// Whether its columns are made of the smoothed sign of a velocity.
+    pub of_sign: bool,
+    /// Whether several forms of it may stand at a place.
+    pub may_repeat: bool,
+}
+
+/// What most causes are.
+const PLAIN: TorqueCauseDescription = TorqueCauseDescription {
+    name: "",
+    coefficients: &[],
+    price: 6.0,
+    modifies: &[],
+    rich: false,
+    positive: false,
+    of_angle: false,
+    inertial: false,
+    alike_at_joints: false,
+    of_rigid: false,
+    of_sign: false,
+    may_repeat: false,
+};
+
 /// A physical reason why measured torques differ from those of the rigid arm.
 pub(super) trait TorqueCause: Sync {
-    /// Canonical.
-    fn name(&self) -> &'static str;
+    /// What it is.
+    fn about(&self) -> &'static TorqueCauseDescription;
+    /// Its canonical name.
+    fn name(&self) -> &'static str {
+        self.about().name
+    }
     /// All that are tried on a recording.
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm>;
     /// -2 ln of how common it is beside a common one.
     fn price(&self, _form: &TorqueForm) -> f64 {
-        6.0
+        self.about().price
     }
     /// Joints whose torque it changes: its own, and those that carry its link or the tool and the base.
     fn acts_on(&self, form: &TorqueForm, joints: usize) -> Vec<usize> {
@@ -111,17 +159,9 @@ pub(super) trait TorqueCause: Sync {
     fn inertial(&self, _form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
         None
     }
-    /// Frictions of the same joint that it modifies, and without which it is none.
-    fn modifies(&self) -> &'static [&'static str] {
-        &[]
-    }
     /// Whether the form is part of the rich model, which noise is taken from.
     fn is_rich(&self, _form: &TorqueForm) -> bool {
-        false
-    }
-    /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
-    fn is_positive(&self) -> bool {
-        false
+        self.about().rich
     }
     /// Whether its coefficients are ones that an arm can have: no link weighs less than nothing.
     fn is_possible(&self, _form: &TorqueForm, _values: &[f64]) -> bool {
@@ -130,30 +170,6 @@ pub(super) trait TorqueCause: Sync {
     /// Whether its shape numbers are still those of this cause and not at an end where it is another's torque.
     fn is_itself(&self, _form: &TorqueForm, _scene: &DynamicScene) -> bool {
         true
-    }
-    /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
-    fn is_of_angle(&self) -> bool {
-        false
-    }
-    /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
-    fn is_inertial(&self) -> bool {
-        false
-    }
-    /// Whether its columns are the same at whatever joint it acts.
-    fn is_alike_at_joints(&self) -> bool {
-        false
-    }
-    /// Whether its columns are made of the rigid torque.
-    fn is_of_rigid(&self) -> bool {
-        false
-    }
-    /// Whether its columns are made of the smoothed sign of a velocity.
-    fn is_of_sign(&self) -> bool {
-        false
-    }
-    /// Whether several forms of it may stand at a place.
-    fn may_repeat(&self) -> bool {
-        false
     }
     /// Shape numbers that are refined once it is found.
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -167,12 +183,13 @@ pub(super) trait TorqueCause: Sync {
     fn has_shape(&self, _shape: &[f64]) -> bool {
         true
     }
-    /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[]
+    /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
+        let coefficients = self.about().coefficients.iter().zip(fitted);
+        let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
+        let shapes = form.shape_numbers().into_iter().map(|span| shape(span.name, form.shape[span.index], span.unit));
+        coefficients.chain(shapes).collect()
     }
-    /// Its numbers as people read them.
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter>;
     /// A sentence without a full stop, with its size.
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String;
 }
@@ -251,7 +268,7 @@ impl TorqueForm {
 
     /// What its coefficients are called, one a column, with their units.
     pub fn coefficient_names(&self) -> Vec<(String, &'static str)> {
-        let known = self.cause.coefficients();
+        let known = self.cause.about().coefficients;
         let name = |column: usize| match known.get(column) {
             Some((quantity, unit)) => ((*quantity).to_string(), *unit),
             None => (format!("coefficient_{}", column + 1), "1"),

@@ -1,10 +1,9 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
 use super::{
-    CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, at_each_joint_with, fill, plain, shape,
+    FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, at_each_joint_with, fill,
 };
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
 pub(in crate::dynamics) const OFFSET: &str = "current_offset";
@@ -21,8 +20,8 @@ const USUAL: f64 = 15.0;
 const LONGEST: f64 = 0.45;
 
 impl TorqueCause for Offset {
-    fn name(&self) -> &'static str {
-        OFFSET
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -52,22 +51,6 @@ impl TorqueCause for Offset {
             0 => out.fill(1.0),
             _ => fill(out, |row| (-scene.time[row] / form.shape[0]).exp()),
         }
-    }
-
-    fn is_of_angle(&self) -> bool {
-        true
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("offset", "Nm"), ("cold", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let mut all = vec![plain("offset", fitted[0], "Nm")];
-        if let (Some(cold), Some(time)) = (fitted.get(1), form.shape.first()) {
-            all.extend([plain("cold", *cold, "Nm"), shape("time", *time, "s")]);
-        }
-        all
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,6 +1,6 @@
 //! A payload that is not the declared one.
 
-use super::{FittedNumber, TorqueCause, TorqueForm, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -20,26 +20,14 @@ const OTHERS: [&str; 9] =
 const WIDTHS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 
 impl TorqueCause for Payload {
-    fn name(&self) -> &'static str {
-        "payload_error"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: "payload_error", price: 4.0, rich: true, inertial: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let mass = scene.arm.payload.map_or(0.0, |payload| payload.mass);
         let form = |width| TorqueForm { place: Place::Tool, ..TorqueForm::at_joint(&Payload, 0, width).shaped(&[mass]) };
         if scene.declared.is_some() { WIDTHS.map(form).to_vec() } else { Vec::new() }
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        4.0
-    }
-
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
-    }
-
-    fn is_inertial(&self) -> bool {
-        true
     }
 
     fn is_possible(&self, form: &TorqueForm, values: &[f64]) -> bool {

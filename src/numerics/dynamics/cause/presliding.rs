@@ -1,8 +1,7 @@
 //! Friction that turns with the direction of motion only after a travel, and is kept at rest.
 
-use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968).
 pub(super) struct PreslidingFriction;
@@ -14,24 +13,20 @@ const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL], &[0.01], &[0.025]]
 const REST: f64 = 2e-3;
 
 impl TorqueCause for PreslidingFriction {
-    fn name(&self) -> &'static str {
-        "presliding_friction"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "presliding_friction",
+            coefficients: &[("kept", "Nm")],
+            price: 25.0,
+            of_sign: true,
+            modifies: &[COULOMB],
+            positive: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&PreslidingFriction, scene, 1, &TRAVELS)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        25.0
-    }
-
-    fn modifies(&self) -> &'static [&'static str] {
-        &[COULOMB]
-    }
-
-    fn is_positive(&self) -> bool {
-        true
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
@@ -40,10 +35,6 @@ impl TorqueCause for PreslidingFriction {
 
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
         vec![ShapeSpan { name: "travel", unit: "rad", index: 0, least: 3e-4, most: 0.05, by_ratio: true, usual: None }]
-    }
-
-    fn is_of_sign(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
@@ -58,14 +49,6 @@ impl TorqueCause for PreslidingFriction {
                 out[row] = kept - scene.direction(form.joint(), row);
             }
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("kept", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("kept", fitted[0], "Nm"), shape("travel", form.shape[0], "rad")]
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

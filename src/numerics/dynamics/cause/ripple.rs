@@ -1,6 +1,6 @@
 //! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, shape};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -21,8 +21,19 @@ impl Ripple {
 }
 
 impl TorqueCause for Ripple {
-    fn name(&self) -> &'static str {
-        "torque_ripple"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "torque_ripple",
+            coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
+            may_repeat: true,
+            of_angle: true,
+            ..PLAIN
+        }
+    }
+
+    /// As common as other causes, over all orders together.
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        6.0 + 2.0 * ((ORDERS + MOTOR_ORDERS) as f64).ln()
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -40,21 +51,8 @@ impl TorqueCause for Ripple {
         forms
     }
 
-    /// As common as other causes, over all orders together.
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        6.0 + 2.0 * ((ORDERS + MOTOR_ORDERS) as f64).ln()
-    }
-
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[1] == 0 && form.with[0] <= USUAL
-    }
-
-    fn is_of_angle(&self) -> bool {
-        true
-    }
-
-    fn may_repeat(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
@@ -63,10 +61,6 @@ impl TorqueCause for Ripple {
             0 => fill(out, |row| (periods * angle[row]).cos()),
             _ => fill(out, |row| (periods * angle[row]).sin()),
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("cosine", "Nm"), ("sine", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

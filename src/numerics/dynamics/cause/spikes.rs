@@ -1,8 +1,7 @@
 //! Lost motion: a knock after each reversal of a joint.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// (t / T) exp(1 - t / T) after a reversal, with the new direction's sign.
 pub(super) struct Spikes;
@@ -16,16 +15,12 @@ const REST: f64 = 0.006;
 const OVER: f64 = 20.0;
 
 impl TorqueCause for Spikes {
-    fn name(&self) -> &'static str {
-        "backlash_spikes"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: "backlash_spikes", coefficients: &[("height", "Nm")], price: 25.0, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Spikes, scene, 1, &TIMES)
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        25.0
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
@@ -54,14 +49,6 @@ impl TorqueCause for Spikes {
                 }
             }
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("height", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("height", fitted[0], "Nm"), shape("time", form.shape[0], "s")]
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,21 +1,19 @@
 //! Torque that grows with the angle of a joint: a balancing spring at joint 2, a cable or hose elsewhere.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// q and 1; of a cable that stiffens as it bends its square and cube, too. Shape of a cable: least and greatest angle, rad.
 pub(super) struct SpringTorque {
-    name: &'static str,
     balances: bool,
 }
 
 /// At the joint that arms balance.
-pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { name: SPRING_BALANCE_NAME, balances: true };
+pub(super) static SPRING_BALANCE: SpringTorque = SpringTorque { balances: true };
 /// Its name.
 pub(super) const SPRING_BALANCE_NAME: &str = "spring_balance";
 /// At the others.
-pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { name: "cable_stiffness", balances: false };
+pub(super) static CABLE_STIFFNESS: SpringTorque = SpringTorque { balances: false };
 /// Angles at which the stiffness is looked at.
 const CHECKED: usize = 8;
 /// Columns.
@@ -24,8 +22,14 @@ const WIDTHS: [usize; 2] = [2, 4];
 pub(super) const BALANCED: usize = 1;
 
 impl TorqueCause for SpringTorque {
-    fn name(&self) -> &'static str {
-        self.name
+    fn about(&self) -> &'static TorqueCauseDescription {
+        const CABLE: TorqueCauseDescription = TorqueCauseDescription {
+            name: "cable_stiffness",
+            coefficients: &[("stiffness", "Nm/rad"), ("at_zero", "Nm"), ("square", "Nm/rad2"), ("cube", "Nm/rad3")],
+            of_angle: true,
+            ..PLAIN
+        };
+        if self.balances { &TorqueCauseDescription { name: SPRING_BALANCE_NAME, ..CABLE } } else { &CABLE }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -41,10 +45,6 @@ impl TorqueCause for SpringTorque {
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.width == WIDTHS[0]
-    }
-
-    fn is_of_angle(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
@@ -68,14 +68,6 @@ impl TorqueCause for SpringTorque {
         let stiffness = |q: f64| number(0) + 2.0 * number(2) * q + 3.0 * number(3) * q * q;
         let &[least, most] = &form.shape[..] else { return true };
         (0..=CHECKED).all(|k| stiffness(least + (most - least) * k as f64 / CHECKED as f64) > 0.0)
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("stiffness", "Nm/rad"), ("at_zero", "Nm"), ("square", "Nm/rad2"), ("cube", "Nm/rad3")]
-    }
-
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        self.coefficients().iter().zip(fitted).map(|((name, unit), number)| plain(name, *number, unit)).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,8 +1,7 @@
 //! Friction that is greater at low speed and falls as the joint gets faster.
 
-use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
+use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// sgn v exp(-|v| / vs) (Armstrong-Helouvry, 1994).
 pub(super) struct Stribeck;
@@ -17,8 +16,15 @@ const SPEEDS: [&[f64]; 8] =
 const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
 impl TorqueCause for Stribeck {
-    fn name(&self) -> &'static str {
-        "stribeck_friction"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "stribeck_friction",
+            coefficients: &[("stribeck", "Nm")],
+            of_sign: true,
+            modifies: &[COULOMB],
+            positive: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -29,17 +35,9 @@ impl TorqueCause for Stribeck {
         if form.shape.get(1).is_none_or(|exponent| *exponent == 1.0) { 6.0 } else { 10.0 }
     }
 
-    fn modifies(&self) -> &'static [&'static str] {
-        &[COULOMB]
-    }
-
     /// What falls within the width over which the sign turns is a sign of another width.
     fn is_itself(&self, form: &TorqueForm, scene: &DynamicScene) -> bool {
         form.shape[0] > NARROWEST * scene.width_at(form.joint())
-    }
-
-    fn is_positive(&self) -> bool {
-        true
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {
@@ -53,10 +51,6 @@ impl TorqueCause for Stribeck {
         vec![speed, exponent, speed]
     }
 
-    fn is_of_sign(&self) -> bool {
-        true
-    }
-
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
         let velocity = &scene.velocity[form.joint()];
         fill(out, |row| scene.direction(form.joint(), row) * falls(form, velocity[row]));
@@ -64,16 +58,6 @@ impl TorqueCause for Stribeck {
 
     fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {
         Some(sign * falls(form, velocity))
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("stribeck", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let all = [plain("stribeck", fitted[0], "Nm"), shape("speed", form.shape[0], "rad/s")];
-        let exponent = form.shape.get(1).filter(|exponent| **exponent != 1.0).map(|exponent| shape("exponent", *exponent, "1"));
-        all.into_iter().chain(exponent).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

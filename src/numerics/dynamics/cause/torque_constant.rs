@@ -1,8 +1,7 @@
 //! A current that makes another torque than declared.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint, fill, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
@@ -16,8 +15,14 @@ const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 const MOST: f64 = 0.6;
 
 impl TorqueCause for TorqueConstant {
-    fn name(&self) -> &'static str {
-        "torque_constant"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "torque_constant",
+            coefficients: &[("relative", "1")],
+            inertial: true,
+            of_rigid: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -46,14 +51,6 @@ impl TorqueCause for TorqueConstant {
         form.shape.get(1).map(span).into_iter().collect()
     }
 
-    fn is_inertial(&self) -> bool {
-        true
-    }
-
-    fn is_of_rigid(&self) -> bool {
-        true
-    }
-
     fn is_possible(&self, _form: &TorqueForm, values: &[f64]) -> bool {
         values[0].abs() < MOST
     }
@@ -64,15 +61,6 @@ impl TorqueCause for TorqueConstant {
             None => out.copy_from_slice(&scene.rigid[joint]),
             Some(half) => fill(out, |row| scene.rigid[joint][row] / (1.0 + scene.rigid[joint][row].abs() / half)),
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("relative", "1")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let half = form.shape.first().map(|half| shape("half_at", *half, "Nm"));
-        [plain("relative", fitted[0], "1")].into_iter().chain(half).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,8 +1,7 @@
 //! What has no name: a smooth torque at a joint, in the angles of two joints.
 
-use super::{CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
+use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
 pub(in crate::dynamics) const UNKNOWN: &str = "unknown";
@@ -11,8 +10,15 @@ pub(in crate::dynamics) const UNKNOWN: &str = "unknown";
 pub(super) struct Unnamed;
 
 impl TorqueCause for Unnamed {
-    fn name(&self) -> &'static str {
-        UNKNOWN
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: UNKNOWN,
+            coefficients: &[("sin_sin", "Nm"), ("sin_cos", "Nm"), ("cos_sin", "Nm"), ("cos_cos", "Nm")],
+            price: 30.0,
+            may_repeat: true,
+            alike_at_joints: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -28,18 +34,6 @@ impl TorqueCause for Unnamed {
         forms
     }
 
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        30.0
-    }
-
-    fn is_alike_at_joints(&self) -> bool {
-        true
-    }
-
-    fn may_repeat(&self) -> bool {
-        true
-    }
-
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let [first, second] = form.with.map(|joint| &scene.position[joint]);
         match column {
@@ -52,15 +46,6 @@ impl TorqueCause for Unnamed {
 
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.is_empty()
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("sin_sin", "Nm"), ("sin_cos", "Nm"), ("cos_sin", "Nm"), ("cos_cos", "Nm")]
-    }
-
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let names = ["sin_sin", "sin_cos", "cos_sin", "cos_cos"];
-        names.iter().zip(fitted).map(|(name, value)| plain(name, *value, "Nm")).collect()
     }
 
     fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {

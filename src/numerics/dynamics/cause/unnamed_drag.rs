@@ -1,7 +1,7 @@
 //! Friction without a name that is greater at some angles of its joint: ways, seals and lubricant differ along a turn.
 
 use super::unknown::UNKNOWN;
-use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, fill, plain};
+use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -12,8 +12,16 @@ pub(super) struct UnnamedDrag;
 const ORDERS: usize = 4;
 
 impl TorqueCause for UnnamedDrag {
-    fn name(&self) -> &'static str {
-        UNKNOWN
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: UNKNOWN,
+            coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
+            price: 30.0,
+            of_sign: true,
+            modifies: &[COULOMB],
+            may_repeat: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -25,22 +33,6 @@ impl TorqueCause for UnnamedDrag {
         (0..scene.joints()).flat_map(of).collect()
     }
 
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        30.0
-    }
-
-    fn modifies(&self) -> &'static [&'static str] {
-        &[COULOMB]
-    }
-
-    fn may_repeat(&self) -> bool {
-        true
-    }
-
-    fn is_of_sign(&self) -> bool {
-        true
-    }
-
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let angle = &scene.position[form.joint()];
         let turn = |row: usize| form.with[0] as f64 * angle[row];
@@ -50,10 +42,6 @@ impl TorqueCause for UnnamedDrag {
 
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.len() == 2
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("drag_cosine", "Nm"), ("drag_sine", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

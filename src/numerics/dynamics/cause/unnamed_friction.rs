@@ -1,17 +1,24 @@
 //! Friction without a name: a smooth curve of speed beside viscous and Coulomb friction.
 
 use super::unknown::UNKNOWN;
-use super::{COULOMB, CoefficientName, FittedNumber, TorqueCause, TorqueForm, VISCOUS, fill, plain};
+use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, VISCOUS, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
 
 /// Half a wave and a whole one of speed, up to the fastest (shape, rad/s), with the sign of the velocity.
 pub(super) struct UnnamedFriction;
 
 impl TorqueCause for UnnamedFriction {
-    fn name(&self) -> &'static str {
-        UNKNOWN
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: UNKNOWN,
+            coefficients: &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")],
+            price: 30.0,
+            of_sign: true,
+            modifies: &[VISCOUS, COULOMB],
+            may_repeat: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -20,22 +27,6 @@ impl TorqueCause for UnnamedFriction {
             TorqueForm::at_joint(&UnnamedFriction, joint, 4).shaped(&[fastest])
         };
         (0..scene.joints()).map(form).collect()
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        30.0
-    }
-
-    fn modifies(&self) -> &'static [&'static str] {
-        &[VISCOUS, COULOMB]
-    }
-
-    fn may_repeat(&self) -> bool {
-        true
-    }
-
-    fn is_of_sign(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
@@ -49,15 +40,6 @@ impl TorqueCause for UnnamedFriction {
 
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.len() == 1
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")]
-    }
-
-    fn parameters(&self, _form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let names = ["half_wave_sin", "half_wave_cos", "wave_sin", "wave_cos"];
-        names.iter().zip(fitted).map(|(name, value)| plain(name, *value, "Nm")).collect()
     }
 
     fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {

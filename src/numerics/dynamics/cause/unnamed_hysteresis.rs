@@ -1,9 +1,8 @@
 //! Drag without a name that turns over only after a travel of a good part of a radian: hoses and cable guides that bend with their joint.
 
 use super::unknown::UNKNOWN;
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Exponential over a travel after each reversal, kept at rest; shape: travel, least and greatest one, rad.
 pub(super) struct UnnamedHysteresis;
@@ -13,25 +12,20 @@ const SPAN: [f64; 2] = [0.05, 1.0];
 const TRAVELS: [f64; 3] = [0.08, 0.2, 0.5];
 
 impl TorqueCause for UnnamedHysteresis {
-    fn name(&self) -> &'static str {
-        UNKNOWN
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: UNKNOWN,
+            coefficients: &[("kept", "Nm")],
+            price: 30.0,
+            positive: true,
+            may_repeat: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let shapes = TRAVELS.map(|travel| [travel, SPAN[0], SPAN[1]]);
         at_each_joint_with(&UnnamedHysteresis, scene, 1, &shapes.each_ref().map(|shape| &shape[..]))
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        30.0
-    }
-
-    fn is_positive(&self) -> bool {
-        true
-    }
-
-    fn may_repeat(&self) -> bool {
-        true
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -63,14 +57,6 @@ impl TorqueCause for UnnamedHysteresis {
 
     fn has_shape(&self, shape: &[f64]) -> bool {
         shape.len() == 3
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("kept", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![plain("kept", fitted[0], "Nm"), shape("travel", form.shape[0], "rad")]
     }
 
     fn statement(&self, form: &TorqueForm, _fitted: &[FittedNumber]) -> String {

@@ -1,8 +1,7 @@
 //! Friction that grows with the velocity of a joint.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, fill, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// Its name.
 pub(in crate::dynamics) const VISCOUS: &str = "viscous_friction";
@@ -14,20 +13,12 @@ pub(super) struct Viscous;
 const EXPONENTS: [f64; 2] = [0.4, 1.6];
 
 impl TorqueCause for Viscous {
-    fn name(&self) -> &'static str {
-        VISCOUS
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true, ..PLAIN }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Viscous, scene, 1, &[&[1.0]])
-    }
-
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        0.0
-    }
-
-    fn is_rich(&self, _form: &TorqueForm) -> bool {
-        true
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
@@ -43,15 +34,6 @@ impl TorqueCause for Viscous {
 
     fn friction(&self, form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
         Some(power(form, velocity))
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("viscous", "Nm s/rad")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        let exponent = exponent(form).map(|exponent| shape("exponent", exponent, "1"));
-        [plain("viscous", fitted[0], "Nm s/rad")].into_iter().chain(exponent).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -1,8 +1,7 @@
 //! Friction that falls while the gear warms up.
 
-use super::{COULOMB, CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
+use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, VISCOUS, fill};
 use crate::dynamics::scene::DynamicScene;
-use crate::dynamics::types::TorqueParameter;
 
 /// exp(-t / T) times velocity and its sign; shape: T and the longest of it, `with` marks the form that stands in the rich model.
 pub(super) struct Warmup;
@@ -15,8 +14,14 @@ const LONGEST: f64 = 0.45;
 const USUAL: f64 = 18.0;
 
 impl TorqueCause for Warmup {
-    fn name(&self) -> &'static str {
-        "warmup_friction"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "warmup_friction",
+            coefficients: &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")],
+            of_sign: true,
+            modifies: &[VISCOUS, COULOMB],
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -33,20 +38,12 @@ impl TorqueCause for Warmup {
         (0..scene.joints()).flat_map(of).collect()
     }
 
-    fn modifies(&self) -> &'static [&'static str] {
-        &[VISCOUS, COULOMB]
-    }
-
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[0] == 1
     }
 
     fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
         vec![ShapeSpan { name: "time", unit: "s", index: 0, least: 1.0, most: form.shape[1], by_ratio: true, usual: None }]
-    }
-
-    fn is_of_sign(&self) -> bool {
-        true
     }
 
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
@@ -56,18 +53,6 @@ impl TorqueCause for Warmup {
             0 => fill(out, |row| decay(row) * velocity[row]),
             _ => fill(out, |row| decay(row) * scene.direction(form.joint(), row)),
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")]
-    }
-
-    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
-        vec![
-            plain("viscous_cold", fitted[0], "Nm s/rad"),
-            plain("coulomb_cold", fitted[1], "Nm"),
-            shape("time", form.shape[0], "s"),
-        ]
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

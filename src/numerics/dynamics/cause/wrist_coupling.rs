@@ -1,6 +1,6 @@
 //! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
 
-use super::{CoefficientName, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, plain, shape};
+use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -18,8 +18,14 @@ const LEAST_RATIO: f64 = 0.15;
 const WRIST: usize = 3;
 
 impl TorqueCause for WristCoupling {
-    fn name(&self) -> &'static str {
-        "wrist_coupling"
+    fn about(&self) -> &'static TorqueCauseDescription {
+        &TorqueCauseDescription {
+            name: "wrist_coupling",
+            coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
+            of_sign: true,
+            positive: true,
+            ..PLAIN
+        }
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -54,10 +60,6 @@ impl TorqueCause for WristCoupling {
         form.shape[0].abs() > LEAST_RATIO
     }
 
-    fn is_positive(&self) -> bool {
-        true
-    }
-
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.with[1] == 1 && USUAL.contains(&form.shape[0])
     }
@@ -67,10 +69,6 @@ impl TorqueCause for WristCoupling {
         vec![ShapeSpan { name: "ratio", unit: "1", index: 0, least, most, by_ratio: false, usual: None }]
     }
 
-    fn is_of_sign(&self) -> bool {
-        true
-    }
-
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         let (moved, by, ratio) = (form.joint(), form.with[0], form.shape[0]);
         let share = if joint == moved { 1.0 } else { ratio };
@@ -78,10 +76,6 @@ impl TorqueCause for WristCoupling {
             let together = scene.velocity[moved][row] + ratio * scene.velocity[by][row];
             *value = share * if column == 0 { together } else { scene.sign(together) };
         }
-    }
-
-    fn coefficients(&self) -> &'static [CoefficientName] {
-        &[("viscous", "Nm s/rad"), ("coulomb", "Nm")]
     }
 
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {

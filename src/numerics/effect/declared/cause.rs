@@ -16,7 +16,6 @@ pub struct DeclaredCause {
     about: &'static CauseDescription,
     declaration: EffectDeclaration,
     pattern: DeclaredPattern,
-    measure: Option<Measure>,
 }
 
 /// Every declaration so far, by its content.
@@ -54,8 +53,11 @@ impl DeclaredCause {
                 size: kept(size),
                 confounded: stated(&declaration.confounded, "-"),
                 needs: stated(&declaration.needs, &needs),
+                of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
+                absorbs_residual: &[names::UNKNOWN],
+                measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
+                ..CauseDescription::PLAIN
             })),
-            measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
             declaration,
             pattern,
         }
@@ -110,17 +112,5 @@ impl Cause for DeclaredCause {
         };
         let ends: Vec<String> = shape.iter().filter_map(ends).collect();
         format!("{said}{}", ends.concat())
-    }
-
-    fn is_of_the_measurement(&self) -> bool {
-        self.pattern.seat == Seat::Fixed(Place::Tracker)
-    }
-
-    fn absorbs_residual(&self) -> &'static [&'static str] {
-        &[names::UNKNOWN]
-    }
-
-    fn measure(&self) -> Option<Measure> {
-        self.measure
     }
 }

@@ -103,7 +103,7 @@ const GEOMETRY: [&str; 3] = ["tool_offset.", "joint_offset.", "link_geometry."];
 fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>) -> Model {
     let anchors = places.iter().enumerate().map(|(k, place)| Anchor::point(&name(k), *place)).collect();
     let home = robot.home();
-    let target = ball.map(|place| Target { name: String::new(), seat: Pose::new(home.rotation, place), oriented: false });
+    let target = ball.map(|place| Target { name: String::new(), mounting: Pose::new(home.rotation, place), oriented: false });
     let robot = robot.clone().measured_by(MeasurementSetup { targets: target.into_iter().collect(), anchors });
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let probe = Measurements { joints: robot.joints(), q: vec![0.0; robot.joints()], ..socketed(vec![0], 1.0) };

@@ -16,7 +16,7 @@ pub use brought::{BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, Pri
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
-pub use t_optimal::{Alternative, Contest, Discrimination, MIN_SEPARATION_L, Proposed, tell};
+pub use t_optimal::{Alternative, Discrimination, DiscriminationProblem, MIN_SEPARATION_L, Proposed, tell};
 
 use super::model::Model;
 use crate::criteria::choose::{RANDOM_SETS, STEPS, WORKSPACE};

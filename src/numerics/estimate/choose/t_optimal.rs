@@ -18,7 +18,7 @@ use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Two explanations in one model.
-pub struct Contest {
+pub struct DiscriminationProblem {
     /// With both; what is estimated has its values, the second explanation may stand at zero.
     pub model: Model,
     /// Positions in the stack of what is estimated whichever is true.
@@ -75,16 +75,16 @@ struct View {
 }
 
 impl View {
-    fn of(contest: &Contest, truth: usize, data: &Measurements, rows: &[usize]) -> Self {
-        let (side, other) = (&contest.sides[truth], &contest.sides[1 - truth]);
-        let more = other.parameters.iter().filter(|k| !contest.nuisances.contains(k));
-        let free: Vec<usize> = contest.nuisances.iter().chain(more).copied().collect();
+    fn of(problem: &DiscriminationProblem, truth: usize, data: &Measurements, rows: &[usize]) -> Self {
+        let (side, other) = (&problem.sides[truth], &problem.sides[1 - truth]);
+        let more = other.parameters.iter().filter(|k| !problem.nuisances.contains(k));
+        let free: Vec<usize> = problem.nuisances.iter().chain(more).copied().collect();
         let sized = side.parameters.iter().copied().zip(side.sizes.iter().copied()).collect();
-        let jacobian = PointJacobian::given(&contest.model, free.clone(), sized);
-        let seen = gather(&jacobian.rows(&contest.model, data), rows);
+        let jacobian = PointJacobian::given(&problem.model, free.clone(), sized);
+        let seen = gather(&jacobian.rows(&problem.model, data), rows);
         // One prior sigma of every parameter, and one of L, keep what no row tells apart from being nothing.
         let known = factor(&stacked(&Mat::identity(seen.ncols(), seen.ncols()), &seen));
-        Self { jacobian, rest: PointJacobian::given(&contest.model, free, Vec::new()), known }
+        Self { jacobian, rest: PointJacobian::given(&problem.model, free, Vec::new()), known }
     }
 
     /// L of the recorded rows and these.
@@ -106,19 +106,19 @@ impl View {
 /// Proposes poses that tell the explanations apart, measured in the same set-up as rows `rows` of `data`, whose sigma is that of the fit.
 /// Fails with a sentence when no pose is allowed.
 pub fn tell(
-    contest: &Contest,
+    problem: &DiscriminationProblem,
     (data, rows): (&Measurements, &[usize]),
     (site, circumstances): (&Site, &Circumstances),
     wish: &DesignRequest,
 ) -> Result<Discrimination, String> {
-    let model = &contest.model;
+    let model = &problem.model;
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
     if drawn.rows() < 2 * wish.count {
         return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
     }
     circumstances.complete(&mut drawn, &mut draw);
-    let views = [0, 1].map(|truth| View::of(contest, truth, data, rows));
+    let views = [0, 1].map(|truth| View::of(problem, truth, data, rows));
     let all: Vec<Mat<f64>> = views.iter().map(|view| view.jacobian.rows(model, &drawn)).collect();
     let before = [0, 1].map(|truth| views[truth].separation(&Mat::zeros(0, all[truth].ncols())));
     let alike = [0, 1].map(|truth| {
@@ -144,7 +144,7 @@ pub fn tell(
     let separations = |poses: &Measurements| [0, 1].map(|k: usize| views[k].separation(&views[k].jacobian.rows(model, poses)));
     let mut after = separations(&poses);
     // Where the side of approach says nothing of the two, it is chosen so that it may say something of others.
-    let seen = PointJacobian::of(model, &drawn, &contest.nuisances);
+    let seen = PointJacobian::of(model, &drawn, &problem.nuisances);
     let (direction, approach_seen) = visit_order::approach(model, &seen, &poses, wish.seed);
     let turned = Measurements { direction: Some(direction), ..poses.clone() };
     let other = separations(&turned);

@@ -57,7 +57,7 @@ pub(super) fn name(
         }
     }
     let unexplained = flagged.iter().filter(|row| !kinds.contains_key(row));
-    let mut measured: Vec<usize> = unexplained.map(|row| data.place(*row)).collect();
+    let mut measured: Vec<usize> = unexplained.map(|row| data.rank_in_time(*row)).collect();
     measured.sort_unstable();
     for run in runs(&measured) {
         let run: Vec<usize> = run.iter().map(|place| data.at_place(*place)).collect();

@@ -213,7 +213,7 @@ fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
     let mut stops: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     off.into_iter().for_each(|row| stops.entry(data.stop(row)).or_default().push(row));
     for (first, stop) in stops.into_iter().filter(|(_, stop)| stop.len() > 1) {
-        let from = data.place(first);
+        let from = data.rank_in_time(first);
         let rows: Vec<usize> =
             (from..data.rows()).map(|place| data.at_place(place)).take_while(|row| data.stop(*row) == first).collect();
         if 2 * stop.len() > rows.len() {
