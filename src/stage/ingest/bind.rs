@@ -10,6 +10,7 @@ use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Names in an error message; a header of thousands must not fill the screen.
@@ -34,6 +35,8 @@ pub(super) struct Binding {
     pub constants: Vec<(usize, f64)>,
     /// Joints (from 0) from which so many times another one is taken off.
     pub coupled: Vec<(usize, usize, f64)>,
+    /// Places of a row's numbers that may be filled, ascending.
+    pub filled: Vec<usize>,
     /// Optional columns that the file does not have, for a note.
     pub missing: Vec<String>,
 }
@@ -111,6 +114,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         points: Vec::new(),
         constants: Vec::new(),
         coupled: Vec::new(),
+        filled: Vec::new(),
         missing: Vec::new(),
     };
     let mut binder = Binder { head, binding, faults: Vec::new() };
@@ -168,6 +172,8 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     let brought = arm.slots.kinds.iter().filter_map(|kind| kind.name).any(|name| texts.get(name).is_some_and(Option::is_some));
     binder.binding.measures =
         brought || measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index)) || layout.targets.is_some();
+    let kept = binder.binding.conventions.iter().flat_map(|(places, ..)| places.clone());
+    binder.binding.filled = binder.binding.slots().into_iter().chain(kept).collect::<BTreeSet<usize>>().into_iter().collect();
     if binder.faults.is_empty() {
         Ok(binder.binding)
     } else {

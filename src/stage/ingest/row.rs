@@ -13,9 +13,6 @@ use crate::robot::ONE_AND_A_HALF_TURNS;
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 
-/// A tracker that lost its beam writes these as zero.
-const POINT: [&str; 3] = ["x", "y", "z"];
-
 /// Why a row is not used; the stable word in the table `rejected`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reason {
@@ -106,8 +103,8 @@ impl RowReader<'_> {
         row.turned = None;
         row.line = record.line;
         row.points.clear();
-        row.values.clear();
         row.values.resize(self.arm.slots.count, f64::NAN);
+        self.binding.filled.iter().for_each(|place| row.values[*place] = f64::NAN);
         if record.is_blank(0) {
             return refuse(Reason::Blank, "the whole row is blank".into());
         }
@@ -280,21 +277,23 @@ impl RowReader<'_> {
         if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there) || brought(kind)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for own in kinds.iter().filter(|own| own.kind.about().own_sigma) {
+        for own in kinds.iter().filter(|own| own.own_sigma) {
             let KindSlots { kind, values, sigma, .. } = own;
-            let (name, measured) = (kind.about().name, values.iter().filter(|index| there(index)).count());
+            let measured = values.iter().filter(|index| there(index)).count();
+            let name = || kind.about().name;
             if measured > 0 && measured < values.len() {
-                return refuse(Reason::Blank, format!("the {name} is incomplete"));
+                return refuse(Reason::Blank, format!("the {} is incomplete", name()));
             }
             if (measured > 0 || brought(own)) && !sigma.iter().all(there) {
-                return refuse(Reason::Blank, format!("a measured {name} without its standard deviation"));
+                return refuse(Reason::Blank, format!("a measured {} without its standard deviation", name()));
             }
         }
         Ok(())
     }
 
     fn plausible(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
-        if POINT.iter().all(|axis| row.values.get(self.arm.slots.of(axis).start) == Some(&0.0)) {
+        // A tracker that lost its beam writes these as zero.
+        if row.values.get(self.arm.slots.point.clone()) == Some(&[0.0; 3]) {
             return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
         }
         let q = row.values.get(self.arm.slots.q.clone()).unwrap_or_default();
