@@ -160,6 +160,7 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
 ];
 
 impl Unit {
+    #[inline]
     fn row(self) -> &'static (Unit, &'static str, Quantity, f64, f64) {
         &UNITS[self as usize]
     }
@@ -172,11 +173,13 @@ impl Unit {
         self.row().2
     }
     /// Value in this unit -> SI.
+    #[inline]
     pub fn to_si(self, value: f64) -> f64 {
         let row = self.row();
         value * row.3 + row.4
     }
     /// SI -> value in this unit.
+    #[inline]
     pub fn from_si(self, value: f64) -> f64 {
         let row = self.row();
         (value - row.4) / row.3

@@ -138,7 +138,7 @@ impl Table for Recording {
         let numbers = columns().filter_map(|column| Some((column, self.numbers(column)?)));
         let numbers = numbers.flat_map(|(column, (values, first, step))| {
             let stored = column.columns(&self.prismatic).into_iter().enumerate();
-            stored.map(move |(k, (name, unit))| (name, unit, values.iter().skip(first + k).step_by(step)))
+            stored.map(move |(k, (name, unit))| (name, unit, values.iter().copied().skip(first + k).step_by(step)))
         });
         let texts = texts.map(|(name, texts)| (name, Cell::to_array(texts.clone())));
         frame(self.sequence.clone(), Cell::to_array(self.point_id.clone()), texts, numbers)
@@ -233,7 +233,7 @@ impl Recording {
 }
 
 /// The table of rows with their texts by setting and their numbers (SI; NaN where a row has none) by stored name and unit.
-pub fn frame<'a, N: Iterator<Item = &'a f64>>(
+pub fn frame<N: Iterator<Item = f64>>(
     sequence: Vec<i64>,
     point_id: Column,
     texts: impl Iterator<Item = (&'static str, Column)>,
@@ -243,7 +243,7 @@ pub fn frame<'a, N: Iterator<Item = &'a f64>>(
     frame.push("sequence", Cell::to_array(sequence));
     frame.push("point_id", point_id);
     texts.for_each(|(name, texts)| frame.push(name, texts));
-    numbers.for_each(|(name, unit, values)| frame.push_numbers(name, values.map(|value| unit.from_si(*value))));
+    numbers.for_each(|(name, unit, values)| frame.push_numbers(name, values.map(|value| unit.from_si(value))));
     frame.finish()
 }
 

@@ -80,7 +80,9 @@ impl FileIds {
 
     fn find(&mut self, wanted: (u64, u32)) -> Option<u32> {
         let is = |key: &IdFingerprint| (key.hash, key.check) == wanted;
-        let near = self.keys.iter().skip(self.next).take(NEAR).position(is).map(|ahead| self.next + ahead);
+        let near = |from: usize| self.keys.iter().skip(from).take(NEAR).position(is).map(|ahead| from + ahead);
+        // From the beginning too: rows are looked for more than once.
+        let near = near(self.next).or_else(|| near(0));
         let place = near.or_else(|| {
             self.sort();
             let first = self.sorted.partition_point(|(hash, _)| *hash < wanted.0);

@@ -1,4 +1,4 @@
-//! Rows read by a thread of its own, some hundreds of them before they are judged.
+//! Rows read by a thread of its own, some thousands of them before they are judged.
 
 use super::record::{RecordFields, RecordReader};
 use crate::error::Result;
@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
 use std::thread::{JoinHandle, spawn};
 
 /// Rows that are handed over at a time, and how many such wait.
-const ROWS: usize = 1 << 9;
+const ROWS: usize = 1 << 11;
 const WAITING: usize = 2;
 
 /// Rows in the order of the file.

@@ -225,25 +225,13 @@ impl RowReader<'_> {
     }
 
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
+    #[inline]
     fn number(&self, record: &RecordFields, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
-        let shown = || shown(record, column);
-        let detail = match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
-            Ok(value) => return Ok(Some(value)),
-            Err(NumberFault::Blank) if optional => return Ok(None),
-            Err(NumberFault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
-            Err(NumberFault::Text) if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
-                format!("{name}: `{}` is a clock time, not a number; `unit: {CLOCK}` reads such times", shown())
-            }
-            Err(NumberFault::Text) => format!("{name}: `{}` is not a number", shown()),
-            Err(NumberFault::Comma) => {
-                format!("{name}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", shown())
-            }
-            Err(NumberFault::Point) => {
-                format!("{name}: `{}` has a decimal point; allowed: `decimal: point` in the settings", shown())
-            }
-            Err(NumberFault::NotFinite) => format!("{name}: `{}` is not a finite number", shown()),
-        };
-        refuse(Reason::NotANumber, detail)
+        match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
+            Ok(value) => Ok(Some(value)),
+            Err(NumberFault::Blank) if optional => Ok(None),
+            Err(fault) => no_number(record, column, name, fault),
+        }
     }
 
     /// Makes what a recording keeps of quantities of several numbers.
@@ -334,6 +322,22 @@ impl RowReader<'_> {
         self.last_sequence = Some(value);
         Ok(value)
     }
+}
+
+#[cold]
+fn no_number<T>(record: &RecordFields, column: usize, name: &str, fault: NumberFault) -> Result<T, RowRefusal> {
+    let shown = shown(record, column);
+    let detail = match fault {
+        NumberFault::Blank => return refuse(Reason::Blank, format!("{name} is blank")),
+        NumberFault::Text if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
+            format!("{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times")
+        }
+        NumberFault::Text => format!("{name}: `{shown}` is not a number"),
+        NumberFault::Comma => format!("{name}: `{shown}` has a decimal comma; allowed: `decimal: comma` in the settings"),
+        NumberFault::Point => format!("{name}: `{shown}` has a decimal point; allowed: `decimal: point` in the settings"),
+        NumberFault::NotFinite => format!("{name}: `{shown}` is not a finite number"),
+    };
+    refuse(Reason::NotANumber, detail)
 }
 
 /// A field for people, cut at 40 characters.

@@ -276,9 +276,12 @@ impl<'a> RecordingChunks<'a> {
     fn flush(&mut self) -> Result<()> {
         let texts = self.texts.iter_mut().filter_map(|(name, texts)| Some((*name, texts.as_mut()?.take())));
         let texts = texts.chain(self.sources.as_mut().map(|all| (SIGMA_SOURCE, all.take())));
-        let numbers = self.numbers.iter().map(|Stored { name, unit, values, .. }| (name.clone(), *unit, values.iter()));
+        // As much again follows a whole chunk.
+        let room = if self.sequence.len() >= CHUNK { CHUNK } else { 0 };
+        let numbers = self.numbers.iter_mut().map(|Stored { name, unit, values, .. }| {
+            (name.clone(), *unit, std::mem::replace(values, Vec::with_capacity(room)).into_iter())
+        });
         let frame = recording_frame(std::mem::take(&mut self.sequence), self.ids.take(), texts, numbers)?;
-        self.numbers.iter_mut().for_each(|stored| stored.values.clear());
         self.sink.push(frame)
     }
     pub(super) fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
