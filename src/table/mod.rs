@@ -108,6 +108,7 @@ mod training;
 mod truth;
 mod verdict;
 
+pub use crate::store::frame::TextCells;
 pub use body_consistency::{BodyConsistencies, BodyConsistencyRow};
 pub use changes::{ChangeRow, Changes};
 pub use contacts::{ContactRow, Contacts};

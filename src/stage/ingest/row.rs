@@ -259,13 +259,13 @@ impl RowReader<'_> {
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
-        let kinds = &self.arm.slots.kinds;
+        let kinds = || self.binding.kinds.iter().map(|kind| &self.arm.slots.kinds[*kind]);
         let brought = |kind: &KindSlots| kind.name.and_then(|name| row.texts.get(name)).is_some_and(|name| !name.is_empty());
         let seen = row.points.iter().any(|point| !point[0].is_nan());
-        if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there) || brought(kind)) {
+        if self.binding.measures && !seen && !kinds().any(|kind| kind.values.iter().any(there) || brought(kind)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for own in kinds.iter().filter(|own| own.own_sigma) {
+        for own in kinds().filter(|own| own.own_sigma) {
             let KindSlots { kind, values, sigma, .. } = own;
             let measured = values.iter().filter(|index| there(index)).count();
             let name = || kind.about().name;

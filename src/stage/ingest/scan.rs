@@ -285,8 +285,8 @@ impl RowHasher {
         for value in row.points.iter().flatten() {
             self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
         }
-        for text in &row.texts {
-            self.bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
+        for (place, text) in row.texts.iter().enumerate().filter(|(_, text)| !text.is_empty()) {
+            self.bytes.extend_from_slice([place, text.len()].map(|number| (number as u64).to_le_bytes()).as_flattened());
             self.bytes.extend_from_slice(text.as_bytes());
         }
         XxHash3_128::oneshot(&self.bytes) as u64

@@ -13,8 +13,7 @@ use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
 use crate::stage::{Context, Sink, StreamedTable};
-use crate::store::frame::TextCells;
-use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, recording_frame};
+use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, TextCells, recording_frame};
 use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
