@@ -1,6 +1,6 @@
 //! Rust types that are one cell of a column.
 
-use arrow::array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
+use arrow::array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray, StringBuilder};
 use arrow::datatypes::DataType;
 use std::sync::Arc;
 
@@ -53,3 +53,18 @@ cell!(f64, Float64Array, DataType::Float64, |a: &Float64Array, i| a.value(i));
 cell!(i64, Int64Array, DataType::Int64, |a: &Int64Array, i| a.value(i));
 cell!(bool, BooleanArray, DataType::Boolean, |a: &BooleanArray, i| a.value(i));
 cell!(String, StringArray, DataType::Utf8, |a: &StringArray, i| a.value(i).to_string());
+
+/// A column of texts that grows cell by cell, without a text of its own for each.
+#[derive(Default)]
+pub struct TextCells(StringBuilder);
+
+impl TextCells {
+    /// Adds a cell; none is null.
+    pub fn push(&mut self, text: Option<&str>) {
+        self.0.append_option(text);
+    }
+    /// The column so far; what follows begins another.
+    pub fn take(&mut self) -> ArrayRef {
+        Arc::new(self.0.finish())
+    }
+}

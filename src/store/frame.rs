@@ -3,13 +3,18 @@
 //! [`FrameBuilder::finish`] is the border: behind it nothing is checked again. Columns come out in the order of the schema and
 //! rows in the order of the key, so that neither the order of pushing nor that of computing shows in the content.
 
-use arrow::array::{Array, ArrayRef, RecordBatch, new_null_array};
+use arrow::array::{Array, ArrayRef, Float64Array, RecordBatch, new_null_array};
+use arrow::buffer::NullBuffer;
 use arrow::datatypes::SchemaRef;
+use std::sync::Arc;
 
-pub use super::cell::Cell;
+pub use super::cell::{Cell, TextCells};
 use super::check;
 use super::schema::{self, TableSchema};
 use crate::error::{Error, Result};
+
+/// A column before it is checked.
+pub type Column = ArrayRef;
 
 /// Columns of one table kind, in memory, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +38,17 @@ impl FrameBuilder {
     pub fn push(&mut self, name: impl Into<String>, column: ArrayRef) {
         self.columns.push((name.into(), column));
     }
-    /// The same, but an optional column without a value is left out: tables that never needed it stay as they are.
+    /// Adds a column of numbers, NaN for null.
+    pub fn push_numbers(&mut self, name: impl Into<String>, values: impl Iterator<Item = f64>) {
+        let mut values: Vec<f64> = values.collect();
+        let nulls = values.iter().any(|value| value.is_nan()).then(|| {
+            let present = values.iter().map(|value| !value.is_nan()).collect::<NullBuffer>();
+            values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = 0.0);
+            present
+        });
+        self.push(name, Arc::new(Float64Array::new(values.into(), nulls)));
+    }
+    /// Adds a column, but an optional one without a value is left out: tables that never needed it stay as they are.
     pub fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
         let optional = schema::of(&self.kind)?.fields.iter().any(|field| field.name == name && field.optional);
         if !optional || column.null_count() < column.len() {

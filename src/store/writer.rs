@@ -1,18 +1,21 @@
 //! Tables to Parquet files: chunks in, one file out, in bounded memory and with bytes that do not depend on the chunks.
 
-use arrow::array::RecordBatch;
+use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
 use arrow::compute::concat_batches;
-use arrow::datatypes::{DataType, SchemaRef};
+use arrow::datatypes::{DataType, Float64Type, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, SortingColumn};
 use parquet::file::properties::WriterProperties;
 use parquet::schema::types::ColumnPath;
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
 
 use super::check;
 use super::content::ContentHasher;
@@ -34,12 +37,25 @@ const GROUP_ROWS: usize = 1 << 16;
 /// Tables below this are packed by snappy: making ready a zstd state for every column costs more than what it saves on some kB.
 const SMALL_ROWS: u64 = 4096;
 
-/// Writes one table chunk by chunk; keys ascend within and across chunks.
+/// Writes one table chunk by chunk; keys ascend within and across chunks. A large one is encoded by a thread of its own, which falls
+/// behind by some chunks at most.
 pub struct TableWriter {
     schema: &'static TableSchema,
     path: PathBuf,
     workspace: Arc<Workspace>,
-    open: Option<Open>,
+    rows: u64,
+    state: Option<WriterState>,
+}
+
+enum WriterState {
+    Here(Open),
+    Aside(EncodingThread),
+}
+
+/// Encodes the chunks that it is sent.
+struct EncodingThread {
+    chunks: Option<SyncSender<RecordBatch>>,
+    thread: Option<JoinHandle<Result<Open>>>,
 }
 
 /// A table's finished file, not yet published. Dropped, it leaves nothing.
@@ -52,6 +68,8 @@ pub struct FinishedFile {
 }
 
 struct Open {
+    schema: &'static TableSchema,
+    path: PathBuf,
     /// Made into a writer with the first row group, when it is known whether the table is small.
     file: Option<File>,
     writer: Option<ArrowWriter<HashingFile>>,
@@ -64,31 +82,84 @@ struct Open {
 
 impl TableWriter {
     pub(super) fn new(schema: &'static TableSchema, workspace: Arc<Workspace>) -> Self {
-        Self { schema, path: workspace.fresh(), workspace, open: None }
+        Self { schema, path: workspace.fresh(), workspace, rows: 0, state: None }
     }
 
-    /// Appends a chunk; a table without rows still needs one empty chunk.
+    /// Appends a chunk; a table without rows still needs one empty chunk. May fail for a chunk before.
     pub fn push(&mut self, chunk: &Frame) -> Result<()> {
         if chunk.kind() != self.schema.name {
             return Err(Error::Bug(format!("a chunk of table {} for a table of {}", chunk.kind(), self.schema.name)));
         }
-        if self.open.is_none() {
-            self.open = Some(Open::new(self.schema, chunk, &self.path)?);
+        self.rows += chunk.rows() as u64;
+        match self.state.take() {
+            Some(WriterState::Aside(mut aside)) => {
+                aside.push(chunk.batch())?;
+                self.state = Some(WriterState::Aside(aside));
+            }
+            Some(WriterState::Here(open)) => self.state = Some(self.begun(open, chunk)?),
+            None => self.state = Some(self.begun(Open::new(self.schema, chunk, &self.path)?, chunk)?),
         }
-        let Some(open) = &mut self.open else { return Ok(()) };
-        open.push(self.schema, chunk, &self.path)
+        Ok(())
     }
 
-    /// Written so far.
+    fn begun(&self, mut open: Open, chunk: &Frame) -> Result<WriterState> {
+        if self.rows < GROUP_ROWS as u64 {
+            open.push(chunk.batch())?;
+            return Ok(WriterState::Here(open));
+        }
+        let mut aside = EncodingThread::new(open);
+        aside.push(chunk.batch())?;
+        Ok(WriterState::Aside(aside))
+    }
+
+    /// Taken so far.
     pub fn rows(&self) -> u64 {
-        self.open.as_ref().map_or(0, |open| open.rows)
+        self.rows
     }
 
     /// Closes the file.
     pub fn finish(self) -> Result<FinishedFile> {
-        let open = self.open.ok_or_else(|| Error::Bug(format!("table {}: finished without a chunk", self.schema.name)))?;
-        let (table, written) = open.finish(self.schema, &self.path)?;
+        let open = match self.state {
+            Some(WriterState::Here(open)) => open,
+            Some(WriterState::Aside(aside)) => aside.end()?,
+            None => return Err(Error::Bug(format!("table {}: finished without a chunk", self.schema.name))),
+        };
+        let (table, written) = open.finish()?;
         Ok(FinishedFile { table, path: self.path, written: Some(written), _workspace: self.workspace })
+    }
+}
+
+impl EncodingThread {
+    fn new(mut open: Open) -> Self {
+        let (chunks, taken) = sync_channel::<RecordBatch>(1);
+        let encode = move || taken.into_iter().try_for_each(|chunk| open.push(&chunk)).map(|()| open);
+        Self { chunks: Some(chunks), thread: Some(std::thread::spawn(encode)) }
+    }
+
+    fn push(&mut self, chunk: &RecordBatch) -> Result<()> {
+        match self.chunks.as_ref().map(|chunks| chunks.send(chunk.clone())) {
+            Some(Ok(())) => Ok(()),
+            // It ended before its time.
+            _ => self.join().map(drop),
+        }
+    }
+
+    fn join(&mut self) -> Result<Open> {
+        self.chunks = None;
+        let thread = self.thread.take().ok_or_else(|| Error::Bug("a table that failed before".into()))?;
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+
+    fn end(mut self) -> Result<Open> {
+        self.join()
+    }
+}
+
+impl Drop for EncodingThread {
+    /// A table that is given up leaves no thread behind.
+    fn drop(&mut self) {
+        self.chunks = None;
+        self.thread.take().map(JoinHandle::join);
     }
 }
 
@@ -116,25 +187,26 @@ impl Open {
     fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
         let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
         let (arrow_schema, content) = (chunk.arrow_schema(), ContentHasher::new(&schema.name, schema.version.major));
-        Ok(Self { file: Some(file), writer: None, arrow_schema, content, waiting: Vec::new(), last: None, rows: 0 })
+        let path = path.to_path_buf();
+        Ok(Self { schema, path, file: Some(file), writer: None, arrow_schema, content, waiting: Vec::new(), last: None, rows: 0 })
     }
 
-    fn writer(&mut self, schema: &TableSchema, path: &Path) -> Result<&mut ArrowWriter<HashingFile>> {
+    fn writer(&mut self, first: Option<&RecordBatch>) -> Result<&mut ArrowWriter<HashingFile>> {
         if let Some(file) = self.file.take() {
             let capacity = if self.rows < SMALL_ROWS { 1 << 14 } else { 1 << 18 };
             let sink = HashingFile { file: BufWriter::with_capacity(capacity, file), hasher: blake3::Hasher::new(), bytes: 0 };
-            let properties = properties(schema, &self.arrow_schema, self.rows)?;
+            let properties = properties(self.schema, &self.arrow_schema, first.filter(|_| self.rows >= SMALL_ROWS))?;
             let writer = ArrowWriter::try_new(sink, self.arrow_schema.clone(), Some(properties));
-            self.writer = Some(writer.map_err(|e| parquet_refused(path, e))?);
+            self.writer = Some(writer.map_err(|e| parquet_refused(&self.path, e))?);
         }
-        self.writer.as_mut().ok_or_else(|| Error::Bug(format!("table {}: no file to write to", schema.name)))
+        self.writer.as_mut().ok_or_else(|| Error::Bug(format!("table {}: no file to write to", self.schema.name)))
     }
 
-    fn push(&mut self, schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<()> {
-        if chunk.arrow_schema() != self.arrow_schema {
+    fn push(&mut self, batch: &RecordBatch) -> Result<()> {
+        let schema = self.schema;
+        if batch.schema_ref() != &self.arrow_schema {
             return Err(Error::Bug(format!("table {}: chunks with different columns", schema.name)));
         }
-        let batch = chunk.batch();
         self.content.push(batch);
         if batch.num_rows() == 0 {
             return Ok(());
@@ -149,31 +221,40 @@ impl Open {
         self.rows += batch.num_rows() as u64;
         self.waiting.push(batch.clone());
         let waiting: usize = self.waiting.iter().map(RecordBatch::num_rows).sum();
-        if waiting >= GROUP_ROWS { self.write_groups(schema, path) } else { Ok(()) }
+        if waiting >= GROUP_ROWS { self.write_groups() } else { Ok(()) }
     }
 
     /// Writes whole row groups from what is waiting, so that their borders do not depend on the chunks.
-    fn write_groups(&mut self, schema: &TableSchema, path: &Path) -> Result<()> {
-        let all = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
+    fn write_groups(&mut self) -> Result<()> {
+        let all = self.waiting()?;
         let whole = all.num_rows() / GROUP_ROWS * GROUP_ROWS;
         for start in (0..whole).step_by(GROUP_ROWS) {
-            self.write(&all.slice(start, GROUP_ROWS), schema, path)?;
+            self.write(&all.slice(start, GROUP_ROWS))?;
         }
         let rest = all.slice(whole, all.num_rows() - whole);
         self.waiting = if rest.num_rows() > 0 { vec![rest] } else { Vec::new() };
         Ok(())
     }
 
-    fn write(&mut self, batch: &RecordBatch, schema: &TableSchema, path: &Path) -> Result<()> {
-        self.writer(schema, path)?.write(batch).map_err(|e| parquet_refused(path, e))
+    /// What is waiting, as one batch.
+    fn waiting(&self) -> Result<RecordBatch> {
+        match self.waiting.as_slice() {
+            [batch] => Ok(batch.clone()),
+            all => concat_batches(&self.arrow_schema, all).map_err(|e| Error::Bug(e.to_string())),
+        }
     }
 
-    fn finish(mut self, schema: &'static TableSchema, path: &Path) -> Result<(TableRef, File)> {
+    fn write(&mut self, batch: &RecordBatch) -> Result<()> {
+        self.writer(Some(batch))?.write(batch).map_err(|e| parquet_refused(&self.path, e))
+    }
+
+    fn finish(mut self) -> Result<(TableRef, File)> {
         if !self.waiting.is_empty() {
-            let rest = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
-            self.write(&rest, schema, path)?;
+            let rest = self.waiting()?;
+            self.write(&rest)?;
         }
-        self.writer(schema, path)?;
+        self.writer(None)?;
+        let (schema, path) = (self.schema, &self.path);
         let Some(mut writer) = self.writer else { return Err(Error::Bug(format!("table {}: no writer", schema.name))) };
         let table_hash = self.content.finish();
         writer.append_key_value_metadata(KeyValue::new(CONTENT_HASH.into(), table_hash.to_string()));
@@ -185,8 +266,8 @@ impl Open {
 }
 
 /// Everything that shapes the bytes, so that equal tables make equal files. Schema, key and units are plain key-values besides,
-/// for readers that do not see Arrow's field metadata.
-fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, rows: u64) -> Result<WriterProperties> {
+/// for readers that do not see Arrow's field metadata. Of a large table the first row group is known.
+fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, large: Option<&RecordBatch>) -> Result<WriterProperties> {
     let index = |name: &String| {
         arrow_schema.index_of(name).map(|i| SortingColumn { column_idx: i as i32, descending: false, nulls_first: false })
     };
@@ -201,19 +282,40 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, rows: u64) -> Resu
         ("calib.primary_key", schema.primary_key.join(",")),
         (UNITS, super::key::canonical(&units.into())),
     ];
-    let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
-    let compression = if rows < SMALL_ROWS { Compression::SNAPPY } else { Compression::ZSTD(level) };
+    let zstd = Compression::ZSTD(ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?);
+    let compression = if large.is_some() { zstd } else { Compression::SNAPPY };
     let mut properties = WriterProperties::builder()
         .set_compression(compression)
         .set_max_row_group_row_count(Some(GROUP_ROWS))
         .set_sorting_columns(Some(sorting))
         .set_key_value_metadata(Some(key_values.map(|(key, value)| KeyValue::new(key.into(), value)).into()))
         .set_dictionary_enabled(false);
-    // Measured numbers hardly ever repeat; names of sets, steps and files do.
-    for field in arrow_schema.fields().iter().filter(|field| field.data_type() == &DataType::Utf8) {
-        properties = properties.set_column_dictionary_enabled(ColumnPath::from(field.name().as_str()), true);
+    // Names of sets, steps and files repeat. Of a large table measured numbers and names of points do not: a dictionary of such names is a
+    // second column, and of such numbers zstd, most of the work of writing them, saves a tenth.
+    for (index, field) in arrow_schema.fields().iter().enumerate() {
+        let (path, repeats) = (ColumnPath::from(field.name().as_str()), large.is_none_or(|batch| repeats(batch.column(index))));
+        match field.data_type() {
+            DataType::Utf8 => properties = properties.set_column_dictionary_enabled(path, repeats),
+            DataType::Float64 if !repeats => {
+                properties = properties.set_column_compression(path, Compression::UNCOMPRESSED);
+            }
+            _ => {}
+        }
     }
     Ok(properties.build())
+}
+
+/// Whether a column's first cells have less than half as many values.
+fn repeats(column: &ArrayRef) -> bool {
+    let first = column.slice(0, column.len().min(SMALL_ROWS as usize));
+    let different = match first.data_type() {
+        DataType::Utf8 => first.as_string::<i32>().iter().collect::<HashSet<_>>().len(),
+        DataType::Float64 => {
+            first.as_primitive::<Float64Type>().iter().map(|cell| cell.map(f64::to_bits)).collect::<HashSet<_>>().len()
+        }
+        _ => 0,
+    };
+    2 * different < first.len()
 }
 
 /// The disk's own words, where there are any.

@@ -103,6 +103,7 @@ mod torque_verdict;
 mod verdict;
 mod verdict_sentences;
 
+pub use crate::store::frame::TextCells;
 pub use findings::is_separable_by_poses;
 pub use forms::formula_in_words;
 pub use motion::ArmMotion;

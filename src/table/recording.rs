@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
 use crate::robot::{CIRCUMSTANCES, Measurements, Memories, Named, NoiseBasis, Sequence, SigmaSource, law_columns};
-use crate::store::frame::{Cell, Frame, FrameBuilder};
+use crate::store::frame::{Cell, Column, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::table::point::{is_whole, points};
 use crate::units::Unit;
@@ -138,9 +138,10 @@ impl Table for Recording {
         let numbers = columns().filter_map(|column| Some((column, self.numbers(column)?)));
         let numbers = numbers.flat_map(|(column, (values, first, step))| {
             let stored = column.columns(&self.prismatic).into_iter().enumerate();
-            stored.map(move |(k, (name, unit))| (name, unit, values.iter().skip(first + k).step_by(step)))
+            stored.map(move |(k, (name, unit))| (name, unit, values.iter().copied().skip(first + k).step_by(step)))
         });
-        frame(self.sequence.clone(), self.point_id.clone(), texts.map(|(name, texts)| (name, texts.clone())), numbers)
+        let texts = texts.map(|(name, texts)| (name, Cell::to_array(texts.clone())));
+        frame(self.sequence.clone(), Cell::to_array(self.point_id.clone()), texts, numbers)
     }
 
     fn from_frame(frame: &Frame) -> Result<Self> {
@@ -232,20 +233,17 @@ impl Recording {
 }
 
 /// The table of rows with their texts by setting and their numbers (SI; NaN where a row has none) by stored name and unit.
-pub fn frame<'a, N: Iterator<Item = &'a f64>>(
+pub fn frame<N: Iterator<Item = f64>>(
     sequence: Vec<i64>,
-    point_id: Vec<String>,
-    texts: impl Iterator<Item = (&'static str, Vec<Option<String>>)>,
+    point_id: Column,
+    texts: impl Iterator<Item = (&'static str, Column)>,
     numbers: impl Iterator<Item = (String, Unit, N)>,
 ) -> Result<Frame> {
     let mut frame = FrameBuilder::new(Recording::KIND);
     frame.push("sequence", Cell::to_array(sequence));
-    frame.push("point_id", Cell::to_array(point_id));
-    texts.for_each(|(name, texts)| frame.push(name, Cell::to_array(texts)));
-    for (name, unit, values) in numbers {
-        let stored: Vec<Option<f64>> = values.map(|value| (!value.is_nan()).then(|| unit.from_si(*value))).collect();
-        frame.push(name, Cell::to_array(stored));
-    }
+    frame.push("point_id", point_id);
+    texts.for_each(|(name, texts)| frame.push(name, texts));
+    numbers.for_each(|(name, unit, values)| frame.push_numbers(name, values.map(|value| unit.from_si(value))));
     frame.finish()
 }
 

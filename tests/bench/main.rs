@@ -4,12 +4,14 @@
 //! - `cargo bench -- curve [ROWS ...]` prints time and peak memory over the number of points;
 //! - `cargo bench -- fleet [ROBOTS]` prints CPU time of many robots, Parquet in and out, against that of their fits;
 //! - `cargo bench -- train FILE` trains the network on rows that `tests/reference/training_speed.py` wrote and prints times as JSON;
+//! - `cargo bench -- bare FILE ...` reads delimited files by the csv crate and nothing else (`tests/reference/ingest_speed.py`);
 //! - `cargo bench -- swarm` prints how often and how fast each swarm optimiser finds a known minimum.
 
 #![expect(clippy::disallowed_methods, clippy::print_stdout, reason = "benches read the clock and print figures")]
 
 use std::hint::black_box;
 
+mod bare;
 #[path = "../it/fixture.rs"]
 #[expect(dead_code, reason = "the tests use more of it")]
 mod fixture;
@@ -33,6 +35,7 @@ fn main() {
             fleet::fleet(robots).unwrap_or_else(|error| panic!("{error}"));
         }
         Some((verb, files)) if verb == "train" => files.iter().for_each(|file| train::train(file)),
+        Some((verb, files)) if verb == "bare" => bare::read(files),
         Some((verb, _)) if verb == "swarm" => swarm::table(),
         _ => criterion(),
     }

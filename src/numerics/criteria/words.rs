@@ -15,7 +15,7 @@ criteria! {
     NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
     /// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little
     /// it is confirmed.
-    REJECTED: f64 = 0.5, "probability", "count: more likely than not", "";
+    REJECTED: f64 = 0.8, "probability", "judgement: four to one", "";
     /// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went
     /// astray.
     ASTRAY: f64 = 2.0, "ratio", "judgement: folds of five scatter by less", "";

@@ -22,7 +22,7 @@ pub(super) struct Batches {
     /// Rows of the file, where it says so.
     pub rows: Option<u64>,
     /// The rows.
-    pub batches: Box<dyn Iterator<Item = Result<RecordBatch, String>>>,
+    pub batches: Box<dyn Iterator<Item = Result<RecordBatch, String>> + Send>,
 }
 
 /// Reads one file from its names to its last row.

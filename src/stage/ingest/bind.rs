@@ -5,11 +5,13 @@ use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
+use super::slots::KindSlots;
 use super::wide::WideTargets;
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Names in an error message; a header of thousands must not fill the screen.
@@ -26,6 +28,8 @@ pub(super) struct Binding {
     pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub measures: bool,
+    /// Of the kinds of measurement those of which the file has something.
+    pub kinds: Vec<usize>,
     pub sequence: Option<usize>,
     pub cells: Vec<NumberBinding>,
     /// Of a wide row the point of each target.
@@ -34,6 +38,8 @@ pub(super) struct Binding {
     pub constants: Vec<(usize, f64)>,
     /// Joints (from 0) from which so many times another one is taken off.
     pub coupled: Vec<(usize, usize, f64)>,
+    /// Places of a row's numbers that may be filled, ascending.
+    pub filled: Vec<usize>,
     /// Optional columns that the file does not have, for a note.
     pub missing: Vec<String>,
 }
@@ -77,6 +83,18 @@ pub(super) struct Difference {
 }
 
 impl Binding {
+    /// What follows from the columns that were found.
+    fn settle(&mut self, arm: &RobotJoints, is_wide: bool) {
+        let kept = self.conventions.iter().flat_map(|(places, ..)| places.clone());
+        self.filled = self.slots().into_iter().chain(kept).collect::<BTreeSet<usize>>().into_iter().collect();
+        let brought = |kind: &KindSlots| kind.name.is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some));
+        let is_filled = |place: &usize| self.filled.binary_search(place).is_ok();
+        let is_read = |kind: &KindSlots| kind.values.iter().any(|place| self.cells.iter().any(|cell| cell.index == *place));
+        let kinds = &arm.slots.kinds;
+        self.measures = is_wide || kinds.iter().any(|kind| brought(kind) || is_read(kind));
+        let is_bound = |kind: &KindSlots| brought(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled);
+        self.kinds = (0..kinds.len()).filter(|index| is_bound(&kinds[*index])).collect();
+    }
     /// Slots that this file fills.
     pub(super) fn slots(&self) -> Vec<usize> {
         self.cells.iter().map(|cell| cell.index).chain(self.constants.iter().map(|constant| constant.0)).collect()
@@ -106,11 +124,13 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         texts: arm.slots.texts().iter().map(|_| None).collect(),
         conventions: Vec::new(),
         measures: false,
+        kinds: Vec::new(),
         sequence: None,
         cells: Vec::new(),
         points: Vec::new(),
         constants: Vec::new(),
         coupled: Vec::new(),
+        filled: Vec::new(),
         missing: Vec::new(),
     };
     let mut binder = Binder { head, binding, faults: Vec::new() };
@@ -162,12 +182,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     if let Some(targets) = &layout.targets {
         binder.points(targets)?;
     }
-    let cells = &binder.binding.cells;
-    let measured = arm.slots.kinds.iter().flat_map(|kind| &kind.values);
-    let texts = &binder.binding.texts;
-    let brought = arm.slots.kinds.iter().filter_map(|kind| kind.name).any(|name| texts.get(name).is_some_and(Option::is_some));
-    binder.binding.measures =
-        brought || measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index)) || layout.targets.is_some();
+    binder.binding.settle(arm, layout.targets.is_some());
     if binder.faults.is_empty() {
         Ok(binder.binding)
     } else {

@@ -5,7 +5,7 @@ use super::arm::RobotJoints;
 use super::layout::Join;
 use super::pair::{FileDecision, NONE};
 use super::row::{Reason, RecordedRow, RowRefusal};
-use super::scan::Scan;
+use super::scan::{PackedRows, Scan};
 use crate::observation::{KINDS, Part};
 
 /// What all files give and decide together.
@@ -52,6 +52,13 @@ impl JoinDecisions<'_> {
         }
         let partner = decision.partners.get(file.checked_sub(1)?)?.get((row.number - 1) as usize)?;
         (*partner != NONE).then_some(u64::from(*partner))
+    }
+    /// The rows of the other files that belong to a row of the first, and where they are.
+    pub(super) fn partners(&self, row: &RecordedRow, decision: &FileDecision) -> impl Iterator<Item = (usize, &PackedRows)> {
+        decision.partners.iter().zip(self.scans.iter().skip(1)).filter_map(|(partner, scan)| {
+            let number = partner.get((row.number - 1) as usize)?.checked_sub(1)?;
+            Some((number as usize, scan.packed.as_ref()?))
+        })
     }
     /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
     fn moment(&self, file: usize, row: &RecordedRow, decision: &FileDecision) -> Option<f64> {

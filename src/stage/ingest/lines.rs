@@ -7,6 +7,7 @@ use super::layout::FileLayout;
 use super::record::{BUFFER, Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Result};
 use crate::raw::{Utf16Reader, is_utf16};
+use memchr::{memchr, memchr2_iter};
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 
@@ -100,6 +101,15 @@ impl TextReader {
     }
     /// Appends one physical line without its end; false at the end of the file.
     fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
+        let buffer = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
+        if let Some(end) = memchr(b'\n', buffer).filter(|end| text.len() + end < LONGEST) {
+            text.extend_from_slice(buffer[..end].strip_suffix(b"\r").unwrap_or(&buffer[..end]));
+            self.reader.consume(end + 1);
+            self.bytes += end as u64 + 1;
+            self.lines += 1;
+            return Ok(true);
+        }
+        // It ends beyond what is held, or is the last one.
         let room = LONGEST.saturating_sub(text.len()) as u64;
         let read = (&mut self.reader).take(room).read_until(b'\n', text).map_err(|error| failed(&self.label, &error))?;
         if read == 0 && room > 0 {
@@ -152,14 +162,13 @@ impl RecordReader for TextReader {
             self.uncomment(record)?;
             let comment = self.comment.as_ref().is_some_and(|mark| record.text.starts_with(mark));
             // A line of delimiters alone is a blank row, also where the delimiter is a tab.
-            let delimited = matches!(self.delimiter, Delimiter::Byte(byte) if byte != b' ' && record.text.contains(&byte));
-            if comment || (record.text.trim_ascii().is_empty() && !delimited) {
+            let delimited = || matches!(self.delimiter, Delimiter::Byte(byte) if byte != b' ' && record.text.contains(&byte));
+            if comment || (record.text.trim_ascii().is_empty() && !delimited()) {
                 continue;
             }
             record.fields.clear();
-            record.quoted = record.text.contains(&b'"');
+            record.quoted = !split(&record.text, self.delimiter, &mut record.fields);
             if !record.quoted {
-                split(&record.text, self.delimiter, &mut record.fields);
                 return Ok(true);
             }
             while !unquote(record, self.delimiter) {
@@ -185,16 +194,17 @@ impl RecordReader for TextReader {
     }
 }
 
-/// Fields of a row without quotes.
-fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) {
+/// Fields of a row without quotes; false where it has some.
+fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) -> bool {
     let mut start = 0;
     match delimiter {
         Delimiter::Byte(delimiter) => {
-            for (index, byte) in text.iter().enumerate() {
-                if *byte == delimiter {
-                    fields.push(start..index);
-                    start = index + 1;
+            for index in memchr2_iter(delimiter, b'"', text) {
+                if text[index] == b'"' {
+                    return false;
                 }
+                fields.push(start..index);
+                start = index + 1;
             }
             fields.push(start..text.len());
         }
@@ -212,8 +222,10 @@ fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) {
             if inside {
                 fields.push(start..text.len());
             }
+            return !text.contains(&b'"');
         }
     }
+    true
 }
 
 /// Fields of a row with quotes; false where a quote is still open at the end.

@@ -145,13 +145,13 @@ impl NoiseSlots {
             Some(figures) => (figures, SigmaSource::Instrument),
             None => (START, SigmaSource::Inferred),
         };
-        let mut source = SigmaSource::Recorded;
+        let (mut source, mut sigma) = (SigmaSource::Recorded, None);
         for (axis, place) in point.iter().zip(self.sigma) {
             if axis.is_nan() {
                 values[place] = f64::NAN;
             } else if values[place].is_nan() || values[place] <= 0.0 {
                 // None was recorded, or zero, which nothing measures to.
-                values[place] = figures.sigma(&whole);
+                values[place] = *sigma.get_or_insert_with(|| figures.sigma(&whole));
                 source = source.max(otherwise);
             }
         }

@@ -164,9 +164,9 @@ impl<'a, 'b> Ahead<'a, 'b> {
     /// The partners of a row of the first file in the others.
     fn partner(&mut self, row: &RecordedRow, usable: bool) {
         self.decision.partners.resize_with(self.scans.len() - 1, Vec::new);
-        for (partners, other) in self.decision.partners.iter_mut().zip(&self.scans[1..]) {
+        for (partners, other) in self.decision.partners.iter_mut().zip(&mut self.scans[1..]) {
             let partner = match &self.settings.join {
-                Some(Join::Id {}) if usable && !row.id.is_empty() => other.row_of_id(&row.id),
+                Some(Join::Id {}) if usable && !row.id.is_empty() => other.ids.row_of(&row.id),
                 Some(Join::Order {}) if usable && other.usable.get(row.number as usize - 1) == Some(&true) => {
                     Some(row.number as u32)
                 }
@@ -176,11 +176,8 @@ impl<'a, 'b> Ahead<'a, 'b> {
         }
     }
 
-    fn end_file(&mut self, index: usize, mut scan: Scan) {
-        if index >= self.leading {
-            // By id, for partners to be found.
-            scan.keys.sort_unstable();
-        } else if let Some(chunks) = &mut self.chunks {
+    fn end_file(&mut self, index: usize, scan: Scan) {
+        if let Some(chunks) = self.chunks.as_mut().filter(|_| index < self.leading) {
             chunks.before += scan.read;
         }
         self.decision = FileDecision::default();

@@ -1,8 +1,8 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
+use super::ids::FileIds;
 use super::layout::{Duplicates, Join};
-use super::scan::{IdFingerprint, Scan};
-use std::cmp::Ordering;
+use super::scan::Scan;
 use std::collections::BTreeMap;
 
 /// No partner.
@@ -39,24 +39,18 @@ impl FileDecision {
 pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
     let mut decisions: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
     if let Some(Join::Append {}) | None = join {
-        let mut keys = Vec::new();
-        for scan in scans.iter_mut() {
-            if keys.is_empty() {
-                keys = std::mem::take(&mut scan.keys);
-            } else {
-                keys.append(&mut scan.keys);
-            }
-        }
-        single(&mut keys, duplicates, &mut decisions);
+        let mut ids = FileIds::default();
+        scans.iter_mut().for_each(|scan| ids.append(std::mem::take(&mut scan.ids)));
+        single(&mut ids, duplicates, &mut decisions);
         return decisions;
     }
     for scan in scans.iter_mut() {
-        single(&mut scan.keys, duplicates, &mut decisions);
+        single(&mut scan.ids, duplicates, &mut decisions);
     }
     let ([first, others @ ..], [one, decisions_of_others @ ..]) = (scans, decisions.as_mut_slice()) else { return decisions };
-    for (index, (second, other)) in others.iter().zip(decisions_of_others.iter()).enumerate() {
+    for (index, (second, other)) in others.iter_mut().zip(decisions_of_others.iter()).enumerate() {
         let pairs = match join {
-            Some(Join::Id {}) => by_id(&first.keys, &second.keys),
+            Some(Join::Id {}) => by_id(&first.ids, &mut second.ids),
             Some(Join::Time { tolerance_s, offset_s }) => {
                 let times = |scan: &Scan, decision: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
                     let rows = scan.times.iter().filter(|(_, number)| !decision.twins.contains_key(number));
@@ -90,14 +84,11 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
     decisions
 }
 
-/// Sorts keys by id and leaves one of each id, or none. Copies of one row are one row: they do not contradict each other.
-fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, decisions: &mut [FileDecision]) {
-    keys.sort_unstable();
-    let mut dropped = Vec::new();
-    for same in keys.chunk_by(|a, b| (a.hash, a.check) == (b.hash, b.check)) {
-        let ([first, .., last], keep) = (same, duplicates) else {
-            continue;
-        };
+/// Leaves one row of each id, or none. Copies of one row are one row: they do not contradict each other.
+fn single(ids: &mut FileIds, duplicates: Duplicates, decisions: &mut [FileDecision]) {
+    let mut dropped = false;
+    ids.each_repeated(|same| {
+        let ([first, .., last], keep) = (same, duplicates) else { return };
         let copies = same.iter().all(|key| key.content == first.content);
         let stays = match keep {
             Duplicates::Reject if !copies => None,
@@ -110,30 +101,19 @@ fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, decisions: &mut
             if let Some(decision) = decisions.get_mut(key.file as usize) {
                 decision.twins.insert(key.number, Twin { file: twin.file, line: twin.line, copied });
             }
-            dropped.push(*key);
+            dropped = true;
         }
+    });
+    if dropped {
+        let is_twin =
+            |file: u32, number| decisions.get(file as usize).is_some_and(|decision| decision.twins.contains_key(&number));
+        ids.retain(|key| !is_twin(key.file, key.number));
     }
-    // In the order of `keys`.
-    let mut dropped = dropped.into_iter().peekable();
-    keys.retain(|key| dropped.next_if_eq(key).is_none());
 }
 
-/// Pairs of rows with one id; both lists sorted, every id once.
-fn by_id(first: &[IdFingerprint], second: &[IdFingerprint]) -> Vec<(u32, u32)> {
-    let (mut a, mut b) = (first.iter().peekable(), second.iter().peekable());
-    let mut pairs = Vec::new();
-    while let (Some(left), Some(right)) = (a.peek(), b.peek()) {
-        match (left.hash, left.check).cmp(&(right.hash, right.check)) {
-            Ordering::Less => drop(a.next()),
-            Ordering::Greater => drop(b.next()),
-            Ordering::Equal => {
-                pairs.push((left.number, right.number));
-                a.next();
-                b.next();
-            }
-        }
-    }
-    pairs
+/// Pairs of rows with one id; every id once.
+fn by_id(first: &FileIds, second: &mut FileIds) -> Vec<(u32, u32)> {
+    first.keys().iter().filter_map(|key| Some((key.number, second.row_like(key)?))).collect()
 }
 
 /// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
@@ -176,6 +156,7 @@ fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::row::RecordedRow;
     use super::*;
 
     fn times(times: &[f64]) -> Vec<(f64, u32)> {
@@ -199,16 +180,18 @@ mod tests {
 
     #[test]
     fn of_equal_ids_one_or_none_stays() {
-        let key = |hash, number| IdFingerprint { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
-        let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
         let stays = |duplicates| {
-            let (mut keys, mut decisions) = (keys.clone(), [FileDecision::default()]);
-            single(&mut keys, duplicates, &mut decisions);
+            let (mut ids, mut decisions) = (FileIds::default(), [FileDecision::default()]);
+            for (id, number) in ["B", "A", "B", "B"].into_iter().zip(1..) {
+                let row = RecordedRow { id: id.into(), number, line: number + 1, ..RecordedRow::default() };
+                ids.push(&row, number, 0, "a.csv").unwrap();
+            }
+            single(&mut ids, duplicates, &mut decisions);
             let twins: Vec<(u32, u32)> = decisions[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
-            (keys.iter().map(|key| key.number).collect::<Vec<_>>(), twins)
+            (ids.keys().iter().map(|key| key.number).collect::<Vec<_>>(), twins)
         };
         assert_eq!(stays(Duplicates::Reject), (vec![2], vec![(1, 5), (3, 2), (4, 2)]));
-        assert_eq!(stays(Duplicates::First), (vec![2, 1], vec![(3, 2), (4, 2)]));
+        assert_eq!(stays(Duplicates::First), (vec![1, 2], vec![(3, 2), (4, 2)]));
         assert_eq!(stays(Duplicates::Last), (vec![2, 4], vec![(1, 5), (3, 5)]));
     }
 }

@@ -5,6 +5,7 @@ use super::bind::{FileHeader, bind};
 use super::clock::ClockColumn;
 use super::encoding;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
+use super::prefetch::Prefetched;
 use super::record::{BUFFER, FileFormat, RecordFields, RecordReader, failed};
 use super::row::{RecordedRow, RowReader, RowRefusal};
 use super::{lines, listing, parquet, workbook};
@@ -37,7 +38,9 @@ fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader
 /// An opened file below its header.
 pub(super) struct OpenedFile<'a> {
     pub label: String,
-    rows: Box<dyn RecordReader>,
+    rows: Prefetched,
+    /// What was left out of the file as a whole.
+    remark: Option<String>,
     pub record: RecordFields,
     pub row: RecordedRow,
     reader: RowReader<'a>,
@@ -76,7 +79,8 @@ impl<'a> OpenedFile<'a> {
         }
         let binding = bind(layout, &head, arm)?;
         let reader = RowReader { binding, decimal, limits, arm, last_sequence: None, clock: ClockColumn::default() };
-        Ok(Self { label, rows, record, row: RecordedRow::default(), reader, ahead: !header })
+        let (remark, rows) = (rows.remark(), Prefetched::new(rows));
+        Ok(Self { label, rows, remark, record, row: RecordedRow::default(), reader, ahead: !header })
     }
     /// Lines of the file read so far; of a Parquet file its rows.
     pub(super) fn lines(&self) -> u64 {
@@ -88,7 +92,7 @@ impl<'a> OpenedFile<'a> {
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.rows.remark().into_iter().chain(self.reader.binding.missing.iter().cloned()).collect()
+        self.remark.iter().chain(&self.reader.binding.missing).cloned().collect()
     }
     /// The slots that the file fills, and what it lacks.
     pub(super) fn binding(&self) -> &super::bind::Binding {

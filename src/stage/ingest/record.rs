@@ -13,7 +13,7 @@ pub(super) type Buffered = BufReader<Box<dyn Read + Send>>;
 pub(super) const BUFFER: usize = 1 << 16;
 
 /// Hands out the rows of one file.
-pub(super) trait RecordReader {
+pub(super) trait RecordReader: Send {
     /// The file as the person named it, of a workbook with its sheet.
     fn label(&self) -> &str;
     /// The names of the columns where it has them, then row by row; false at the end. Fails where the file is damaged.

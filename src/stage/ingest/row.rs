@@ -13,9 +13,6 @@ use crate::robot::ONE_AND_A_HALF_TURNS;
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 
-/// A tracker that lost its beam writes these as zero.
-const POINT: [&str; 3] = ["x", "y", "z"];
-
 /// Why a row is not used; the stable word in the table `rejected`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reason {
@@ -106,8 +103,8 @@ impl RowReader<'_> {
         row.turned = None;
         row.line = record.line;
         row.points.clear();
-        row.values.clear();
         row.values.resize(self.arm.slots.count, f64::NAN);
+        self.binding.filled.iter().for_each(|place| row.values[*place] = f64::NAN);
         if record.is_blank(0) {
             return refuse(Reason::Blank, "the whole row is blank".into());
         }
@@ -228,25 +225,13 @@ impl RowReader<'_> {
     }
 
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
+    #[inline]
     fn number(&self, record: &RecordFields, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
-        let shown = || shown(record, column);
-        let detail = match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
-            Ok(value) => return Ok(Some(value)),
-            Err(NumberFault::Blank) if optional => return Ok(None),
-            Err(NumberFault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
-            Err(NumberFault::Text) if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
-                format!("{name}: `{}` is a clock time, not a number; `unit: {CLOCK}` reads such times", shown())
-            }
-            Err(NumberFault::Text) => format!("{name}: `{}` is not a number", shown()),
-            Err(NumberFault::Comma) => {
-                format!("{name}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", shown())
-            }
-            Err(NumberFault::Point) => {
-                format!("{name}: `{}` has a decimal point; allowed: `decimal: point` in the settings", shown())
-            }
-            Err(NumberFault::NotFinite) => format!("{name}: `{}` is not a finite number", shown()),
-        };
-        refuse(Reason::NotANumber, detail)
+        match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
+            Ok(value) => Ok(Some(value)),
+            Err(NumberFault::Blank) if optional => Ok(None),
+            Err(fault) => no_number(record, column, name, fault),
+        }
     }
 
     /// Makes what a recording keeps of quantities of several numbers.
@@ -274,27 +259,29 @@ impl RowReader<'_> {
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
-        let kinds = &self.arm.slots.kinds;
+        let kinds = || self.binding.kinds.iter().map(|kind| &self.arm.slots.kinds[*kind]);
         let brought = |kind: &KindSlots| kind.name.and_then(|name| row.texts.get(name)).is_some_and(|name| !name.is_empty());
         let seen = row.points.iter().any(|point| !point[0].is_nan());
-        if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there) || brought(kind)) {
+        if self.binding.measures && !seen && !kinds().any(|kind| kind.values.iter().any(there) || brought(kind)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for own in kinds.iter().filter(|own| own.kind.about().own_sigma) {
+        for own in kinds().filter(|own| own.own_sigma) {
             let KindSlots { kind, values, sigma, .. } = own;
-            let (name, measured) = (kind.about().name, values.iter().filter(|index| there(index)).count());
+            let measured = values.iter().filter(|index| there(index)).count();
+            let name = || kind.about().name;
             if measured > 0 && measured < values.len() {
-                return refuse(Reason::Blank, format!("the {name} is incomplete"));
+                return refuse(Reason::Blank, format!("the {} is incomplete", name()));
             }
             if (measured > 0 || brought(own)) && !sigma.iter().all(there) {
-                return refuse(Reason::Blank, format!("a measured {name} without its standard deviation"));
+                return refuse(Reason::Blank, format!("a measured {} without its standard deviation", name()));
             }
         }
         Ok(())
     }
 
     fn plausible(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
-        if POINT.iter().all(|axis| row.values.get(self.arm.slots.of(axis).start) == Some(&0.0)) {
+        // A tracker that lost its beam writes these as zero.
+        if row.values.get(self.arm.slots.point.clone()) == Some(&[0.0; 3]) {
             return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
         }
         let q = row.values.get(self.arm.slots.q.clone()).unwrap_or_default();
@@ -335,6 +322,22 @@ impl RowReader<'_> {
         self.last_sequence = Some(value);
         Ok(value)
     }
+}
+
+#[cold]
+fn no_number<T>(record: &RecordFields, column: usize, name: &str, fault: NumberFault) -> Result<T, RowRefusal> {
+    let shown = shown(record, column);
+    let detail = match fault {
+        NumberFault::Blank => return refuse(Reason::Blank, format!("{name} is blank")),
+        NumberFault::Text if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
+            format!("{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times")
+        }
+        NumberFault::Text => format!("{name}: `{shown}` is not a number"),
+        NumberFault::Comma => format!("{name}: `{shown}` has a decimal comma; allowed: `decimal: comma` in the settings"),
+        NumberFault::Point => format!("{name}: `{shown}` has a decimal point; allowed: `decimal: point` in the settings"),
+        NumberFault::NotFinite => format!("{name}: `{shown}` is not a finite number"),
+    };
+    refuse(Reason::NotANumber, detail)
 }
 
 /// A field for people, cut at 40 characters.

@@ -1,10 +1,11 @@
 //! First reading of a file: which rows are usable, and what is needed to find duplicates and partners.
 //!
-//! Memory: 32 bytes a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all; the second
+//! Memory: 32 bytes a row where ids are mapped and as a rule (`ids`), 16 where files are joined by time, 1 where they are joined at all; the second
 //! file of a join is held with its numbers. Where the arm moves, 16 bytes a joint and row for its velocities.
 
 use super::Ingest;
 use super::arm::RobotJoints;
+use super::ids::{FileIds, narrow};
 use super::layout::{FileLayout, Join};
 use super::motion::{JointSamples, Track};
 use super::reading::{OpenedFile, ProgressCounter};
@@ -13,20 +14,7 @@ use crate::error::{Error, Result};
 use crate::stage::Context;
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// What is remembered of a point id: 96 bits of its hash (two ids in 10^7 are confused once in 10^14 files) and its place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct IdFingerprint {
-    pub hash: u64,
-    pub check: u32,
-    /// Index of the file.
-    pub file: u32,
-    /// Data row in its file, from 1.
-    pub number: u32,
-    pub line: u32,
-    /// Hash of what the row says, but for its place in the recording.
-    pub content: u64,
-}
+use twox_hash::XxHash3_128;
 
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
@@ -101,7 +89,7 @@ pub(super) struct Scan {
     /// The last data row that is not blank all over, as a spreadsheet leaves them at the end.
     pub last: u64,
     pub tally: RefusalCounts,
-    pub keys: Vec<IdFingerprint>,
+    pub ids: FileIds,
     /// Time and number of usable rows, for a join by time.
     pub times: Vec<(f64, u32)>,
     /// Usable data rows, for a join.
@@ -116,9 +104,9 @@ pub(super) struct Scan {
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
     /// Hash of what all its usable rows say, of a file with what was measured.
-    pub measured: Option<blake3::Hash>,
+    pub measured: Option<u128>,
     /// Ids of the first usable rows with their data rows, for a join by id.
-    pub ids: Vec<(u32, String)>,
+    pub first_ids: Vec<(u32, String)>,
 }
 
 /// Ids that are kept for examples.
@@ -132,7 +120,7 @@ impl Scan {
             read: 0,
             last: 0,
             tally: RefusalCounts::new(),
-            keys: Vec::new(),
+            ids: FileIds::default(),
             times: Vec::new(),
             usable: Vec::new(),
             packed,
@@ -142,7 +130,7 @@ impl Scan {
             largest: 0.0,
             track: None,
             measured: None,
-            ids: Vec::new(),
+            first_ids: Vec::new(),
         }
     }
     pub(super) fn refused(&self) -> u64 {
@@ -201,7 +189,7 @@ pub(super) fn scan(
     let slots = reading.binding().slots();
     let packed = (joined && index > 0).then(|| PackedRows::of(&reading, layout, arm));
     let mut scan = Scan::new(label, slots, packed);
-    let mut measured = reading.binding().measures.then(blake3::Hasher::new);
+    scan.measured = reading.binding().measures.then_some(0);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
@@ -216,15 +204,15 @@ pub(super) fn scan(
         match &judged {
             Ok(()) => {
                 let identified = keyed && !row.id.is_empty();
-                let content = if identified || measured.is_some() { contents.of(row) } else { 0 };
+                let content = if identified || scan.measured.is_some() { contents.of(row, &reading.binding().filled) } else { 0 };
                 if identified {
-                    scan.keys.push(key(row, content, index, &scan.label)?);
+                    scan.ids.push(row, content, index, &scan.label)?;
                 }
-                if matches!(settings.join, Some(Join::Id {})) && scan.ids.len() < EXAMPLES {
-                    scan.ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
+                if matches!(settings.join, Some(Join::Id {})) && scan.first_ids.len() < EXAMPLES {
+                    scan.first_ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
-                if let Some(hasher) = &mut measured {
-                    hasher.update(&row.number.to_le_bytes()).update(&content.to_le_bytes());
+                if let Some(before) = &mut scan.measured {
+                    *before = contents.behind(*before, row.number, content);
                 }
                 if timed {
                     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
@@ -250,7 +238,6 @@ pub(super) fn scan(
         pace.row(reading.bytes());
     }
     context.services.advance(reading.bytes(), "");
-    scan.measured = measured.map(|hasher| hasher.finalize());
     scan.lines = reading.lines();
     scan.read = reading.row.number;
     if scan.read == 0 {
@@ -277,24 +264,6 @@ fn sample(samples: &mut JointSamples, row: &RecordedRow, layout: &FileLayout, ar
     samples.push(row.number, time, all(&arm.slots.q), given);
 }
 
-fn narrow(number: u64, label: &str) -> Result<u32> {
-    u32::try_from(number).map_err(|_| Error::data(label, "more than 4294967295 rows"))
-}
-
-/// 96 bits of an id's hash.
-fn hash_of_id(id: &str) -> (u64, u32) {
-    let digest = blake3::hash(id.as_bytes());
-    let mut bytes = digest.as_bytes().iter().copied();
-    let hash = first_eight(&mut bytes);
-    (hash, bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte)))
-}
-
-fn key(row: &RecordedRow, content: u64, file: usize, label: &str) -> Result<IdFingerprint> {
-    let (hash, check) = hash_of_id(&row.id);
-    let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
-    Ok(IdFingerprint { hash, check, file: file as u32, number, line, content })
-}
-
 /// Makes hashes of what rows say; its room is used again.
 #[derive(Default)]
 struct RowHasher {
@@ -302,38 +271,38 @@ struct RowHasher {
 }
 
 impl RowHasher {
-    /// Hash of the numbers, points and texts of a row.
-    fn of(&mut self, row: &RecordedRow) -> u64 {
+    /// Hash of the numbers, points and texts of a row; numbers stand in these places.
+    fn of(&mut self, row: &RecordedRow, places: &[usize]) -> u64 {
         self.bytes.clear();
         // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
-        for (place, value) in row.values.iter().enumerate() {
+        for place in places {
+            let value = row.values[*place];
             if !value.is_nan() {
-                self.bytes.extend_from_slice(&(place as u64).to_le_bytes());
+                self.bytes.extend_from_slice(&(*place as u64).to_le_bytes());
                 self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
             }
         }
         for value in row.points.iter().flatten() {
             self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
         }
-        for text in &row.texts {
-            self.bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
+        for (place, text) in row.texts.iter().enumerate().filter(|(_, text)| !text.is_empty()) {
+            self.bytes.extend_from_slice([place, text.len()].map(|number| (number as u64).to_le_bytes()).as_flattened());
             self.bytes.extend_from_slice(text.as_bytes());
         }
-        first_eight(&mut blake3::hash(&self.bytes).as_bytes().iter().copied())
+        XxHash3_128::oneshot(&self.bytes) as u64
     }
-}
 
-fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
-    bytes.by_ref().take(8).fold(0u64, |hash, byte| hash << 8 | u64::from(byte))
+    /// Hash of rows and of one more.
+    fn behind(&mut self, before: u128, number: u64, content: u64) -> u128 {
+        self.bytes.clear();
+        self.bytes.extend_from_slice(&before.to_le_bytes());
+        self.bytes.extend_from_slice(&number.to_le_bytes());
+        self.bytes.extend_from_slice(&content.to_le_bytes());
+        XxHash3_128::oneshot(&self.bytes)
+    }
 }
 
 impl Scan {
-    /// A data row with an id; `keys` are sorted.
-    pub(super) fn row_of_id(&self, id: &str) -> Option<u32> {
-        let wanted = hash_of_id(id);
-        let at = self.keys.binary_search_by(|key| (key.hash, key.check).cmp(&wanted)).ok()?;
-        Some(self.keys[at].number)
-    }
     fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {

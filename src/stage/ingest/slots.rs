@@ -13,6 +13,8 @@ pub(super) struct Slots {
     pub time: usize,
     pub q: Range<usize>,
     pub velocity: Range<usize>,
+    /// The places of a measured point.
+    pub point: Range<usize>,
     /// What each kind of measurement takes.
     pub kinds: Vec<KindSlots>,
 }
@@ -22,6 +24,8 @@ pub(super) struct KindSlots {
     pub kind: &'static dyn MeasurementKind,
     pub values: Vec<usize>,
     pub sigma: Vec<usize>,
+    /// Whether each reading needs its standard deviation.
+    pub own_sigma: bool,
     /// Among the row's texts: what the target was brought to, of a kind that reads nothing.
     pub name: Option<usize>,
 }
@@ -43,9 +47,11 @@ impl Slots {
             time: 0,
             q: 0..0,
             velocity: 0..0,
+            point: 0..0,
             kinds: Vec::new(),
         };
         (slots.time, slots.q, slots.velocity) = (slots.of("time").start, slots.of("q"), slots.of("velocity"));
+        slots.point = slots.of("x").start..slots.of("z").end;
         let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
             kind.columns(part).flat_map(|column| slots.of(column.setting).take(column.stored.len())).collect()
         };
@@ -57,6 +63,7 @@ impl Slots {
             kind: *kind,
             values: part(*kind, Part::Value),
             sigma: part(*kind, Part::Sigma),
+            own_sigma: kind.about().own_sigma,
             name: name(*kind),
         });
         slots.kinds = kinds.collect();
@@ -66,10 +73,6 @@ impl Slots {
     pub(super) fn of(&self, setting: &str) -> Range<usize> {
         let found = self.columns.iter().find(|(column, _)| column.setting == setting);
         found.map_or(0..0, |(_, places)| places.clone())
-    }
-    /// The places of a measured point.
-    pub(super) fn point(&self) -> Range<usize> {
-        self.of("x").start..self.of("z").end
     }
     /// All columns with numbers, and their places.
     pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static DeclaredColumn, Range<usize>)> {

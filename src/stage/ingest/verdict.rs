@@ -184,8 +184,10 @@ fn smaller(scan: &Scan, columns: &Columns) -> &'static str {
 fn unlike(scans: &[Scan], decisions: &[FileDecision], files: [usize; 2]) -> Option<String> {
     let without_partner = |file: usize| -> Option<Vec<&str>> {
         let (scan, decision) = (scans.get(file)?, decisions.get(file)?);
-        let rows =
-            scan.ids.iter().filter(|(number, _)| !decision.is_whole(*number as usize) && !decision.twins.contains_key(number));
+        let rows = scan
+            .first_ids
+            .iter()
+            .filter(|(number, _)| !decision.is_whole(*number as usize) && !decision.twins.contains_key(number));
         Some(rows.map(|(_, id)| id.as_str()).collect())
     };
     let [here, there] = [without_partner(files[0])?, without_partner(files[1])?];

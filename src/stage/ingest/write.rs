@@ -13,7 +13,7 @@ use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
 use crate::stage::{Context, Sink, StreamedTable};
-use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, recording_frame};
+use crate::table::{Recording, Rejected, SIGMA_SOURCE, Table, TextCells, recording_frame};
 use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
@@ -93,14 +93,14 @@ struct Stored {
 pub(super) struct RecordingChunks<'a> {
     sink: Box<dyn Sink + 'a>,
     sequence: Vec<i64>,
-    ids: Vec<String>,
+    ids: TextCells,
     /// By setting; none where no file has it.
-    texts: Vec<(&'static str, Option<Vec<Option<String>>>)>,
+    texts: Vec<(&'static str, Option<TextCells>)>,
     numbers: Vec<Stored>,
     merged: Vec<f64>,
     noise: NoiseSlots,
     /// Where the standard deviation of each row's point comes from; none where no file has points.
-    sources: Option<Vec<SigmaSource>>,
+    sources: Option<TextCells>,
     /// Rows without a stated noise.
     inferred: u64,
     /// The file with the joints.
@@ -139,7 +139,7 @@ impl<'a> RecordingChunks<'a> {
         let always: Vec<&str> = points().map(|column| column.setting).collect();
         let text = |name: &&'static str| {
             let named = *name == "usage" || files.iter().any(|file| file.has(name));
-            (*name, named.then(Vec::new))
+            (*name, named.then(TextCells::default))
         };
         let mut numbers = Vec::new();
         for (column, places) in slots.numbers() {
@@ -152,12 +152,12 @@ impl<'a> RecordingChunks<'a> {
         Ok(Self {
             sink: context.services.sink(Recording::KIND)?,
             sequence: Vec::new(),
-            ids: Vec::new(),
+            ids: TextCells::default(),
             texts: slots.texts().iter().map(text).collect(),
             numbers,
             merged: Vec::new(),
             noise,
-            sources: measured.then(Vec::new),
+            sources: measured.then(TextCells::default),
             inferred: 0,
             moving: files.iter().position(|file| file.columns.has("q")).unwrap_or_default(),
             carried: 0.0,
@@ -179,12 +179,8 @@ impl<'a> RecordingChunks<'a> {
         decision: &FileDecision,
         decided: &JoinDecisions,
     ) -> Result<()> {
-        let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
-        let (mut id, mut texts) = (&row.id, row.texts.iter().collect::<Vec<&String>>());
-        for (partner, scan) in decision.partners.iter().zip(decided.scans.iter().skip(1)) {
-            let number = partner.get((row.number - 1) as usize).and_then(|number| number.checked_sub(1));
-            let Some((at, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
+        for (at, packed) in decided.partners(row, decision) {
             let width = packed.slots.len();
             let values = packed.values.get(at * width..(at + 1) * width).unwrap_or_default();
             for (slot, value) in packed.slots.iter().zip(values) {
@@ -193,50 +189,53 @@ impl<'a> RecordingChunks<'a> {
                     *merged = *value;
                 }
             }
-            id = packed.ids.get(at).unwrap_or(id);
-            for (own, other) in texts.iter_mut().zip(&packed.texts) {
-                *own = other.as_ref().and_then(|other| other.get(at)).unwrap_or(own);
-            }
         }
+        let id = decided.partners(row, decision).filter_map(|(at, packed)| packed.ids.get(at)).last().unwrap_or(&row.id);
+        let text = |place: usize| {
+            let others = decided.partners(row, decision).filter_map(|(at, packed)| packed.texts.get(place)?.as_ref()?.get(at));
+            others.last().or(row.texts.get(place)).map_or("", String::as_str)
+        };
         self.carry(decided, index, row, decision);
         let number = self.before + row.number;
         let time = self.merged[decided.arm.slots.time];
         let (sequence, time) = self.rows.next(row.sequence.unwrap_or(number as i64), time).map_err(|(sequence, last)| {
             // Within a file such a row is refused: this is the first row of a file that continues another.
             let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
+            let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
             Error::data(format!("{label}:{}", row.line), message)
         })?;
         self.merged[decided.arm.slots.time] = time;
-        let id = match decided.arm.slots.kinds.iter().filter_map(|kind| texts.get(kind.name?)).find(|name| !name.is_empty()) {
-            _ if !id.is_empty() => id.clone(),
-            Some(name) => format!("{name} row {}", row.number),
-            None => format!("row {number}"),
+        let unnamed;
+        let id = if id.is_empty() {
+            let name = decided.arm.slots.kinds.iter().filter_map(|kind| kind.name).map(text).find(|name| !name.is_empty());
+            unnamed = name.map_or_else(|| format!("row {number}"), |name| format!("{name} row {}", row.number));
+            &unnamed
+        } else {
+            id
         };
-        let Some(points) = decided.points(index, row, decision) else { return self.one(sequence, id, &texts) };
+        let Some(points) = decided.points(index, row, decision) else { return self.one(sequence, id, text) };
         // Numbered through: the targets of a row follow each other.
         let first = sequence.saturating_sub(1).saturating_mul(self.widest);
         let (merged, of_target) = (self.merged.clone(), self.texts.iter().position(|(name, _)| *name == "target"));
         for (at, target, point) in points {
             self.merged.clone_from(&merged);
-            self.merged[decided.arm.slots.point()].copy_from_slice(&point);
-            if let Some(text) = of_target.and_then(|place| texts.get_mut(place)) {
-                *text = target;
-            }
-            self.one(first.saturating_add(at), id.clone(), &texts)?;
+            self.merged[decided.arm.slots.point.clone()].copy_from_slice(&point);
+            let text = |place| if Some(place) == of_target { target.as_str() } else { text(place) };
+            self.one(first.saturating_add(at), id, text)?;
         }
         Ok(())
     }
     /// A row of the recording: the merged numbers and these texts.
-    fn one(&mut self, sequence: i64, id: String, texts: &[&String]) -> Result<()> {
+    fn one<'t>(&mut self, sequence: i64, id: &str, text: impl Fn(usize) -> &'t str) -> Result<()> {
         let source = self.noise.fill(&mut self.merged);
         if let Some(sources) = &mut self.sources {
             self.inferred += u64::from(source == SigmaSource::Inferred);
-            sources.push(source);
+            sources.push(Some(source.name()));
         }
         self.sequence.push(sequence);
-        self.ids.push(id);
-        for ((_, into), text) in self.texts.iter_mut().zip(texts) {
-            into.iter_mut().for_each(|texts| texts.push((!text.is_empty()).then(|| text.to_string())));
+        self.ids.push(Some(id));
+        for (place, (_, into)) in self.texts.iter_mut().enumerate() {
+            into.iter_mut().for_each(|texts| texts.push(Some(text(place)).filter(|text| !text.is_empty())));
         }
         self.numbers.iter_mut().for_each(|stored| stored.values.push(self.merged[stored.place]));
         self.written += 1;
@@ -274,12 +273,14 @@ impl<'a> RecordingChunks<'a> {
         }
     }
     fn flush(&mut self) -> Result<()> {
-        let texts = self.texts.iter_mut().filter_map(|(name, texts)| Some((*name, std::mem::take(texts.as_mut()?))));
-        let source = self.sources.as_mut().map(|all| (SIGMA_SOURCE, all.drain(..).map(|one| Some(one.name().into())).collect()));
-        let texts = texts.chain(source);
-        let numbers = self.numbers.iter().map(|Stored { name, unit, values, .. }| (name.clone(), *unit, values.iter()));
-        let frame = recording_frame(std::mem::take(&mut self.sequence), std::mem::take(&mut self.ids), texts, numbers)?;
-        self.numbers.iter_mut().for_each(|stored| stored.values.clear());
+        let texts = self.texts.iter_mut().filter_map(|(name, texts)| Some((*name, texts.as_mut()?.take())));
+        let texts = texts.chain(self.sources.as_mut().map(|all| (SIGMA_SOURCE, all.take())));
+        // As much again follows a whole chunk.
+        let room = if self.sequence.len() >= CHUNK { CHUNK } else { 0 };
+        let numbers = self.numbers.iter_mut().map(|Stored { name, unit, values, .. }| {
+            (name.clone(), *unit, std::mem::replace(values, Vec::with_capacity(room)).into_iter())
+        });
+        let frame = recording_frame(std::mem::take(&mut self.sequence), self.ids.take(), texts, numbers)?;
         self.sink.push(frame)
     }
     pub(super) fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
