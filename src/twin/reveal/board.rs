@@ -1,7 +1,7 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
 use super::left_out::LeftOut;
-use super::mark::{Case, Marked, Outcome};
+use super::mark::{Case, DUE, Marked, Outcome};
 use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
@@ -9,8 +9,6 @@ use std::collections::BTreeMap;
 
 /// Lower ends of the bins of visibility L.
 pub const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
-/// From this visibility on an effect should be named.
-pub const DUE: f64 = 50.0;
 /// A held-out error that is no larger over its bound is as good as can be expected.
 pub const NEAR_BOUND: f64 = 1.15;
 

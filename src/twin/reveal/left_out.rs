@@ -1,6 +1,6 @@
 //! Recordings whose own causes were taken out of the list that a diagnosis may name: what was said in their stead.
 
-use super::board::DUE;
+use super::mark::DUE;
 use super::paper::{Answer, Atoms, Truth, atoms};
 use super::place::NAMELESS;
 use super::reliability::{Statement, statements};

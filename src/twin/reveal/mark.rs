@@ -6,6 +6,9 @@ use super::place::{Placed, placed};
 use super::reliability::{Statement, statements};
 use std::collections::BTreeSet;
 
+/// From this visibility on an effect should be named.
+pub const DUE: f64 = 50.0;
+
 /// How a cause was named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {

@@ -1,8 +1,8 @@
 //! The scoreboard for people and for programs.
 
-use super::board::{BINS, Board, Company, Counts, DUE, NEAR_BOUND};
+use super::board::{BINS, Board, Company, Counts, NEAR_BOUND};
 use super::left_out::{GIVEN, LeftOutShares};
-use super::mark::Case;
+use super::mark::{Case, DUE};
 use super::place::Places;
 use super::reliability::{Bin, Reliability, Subject};
 use super::share::Share;
