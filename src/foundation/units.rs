@@ -207,3 +207,17 @@ impl fmt::Display for Unit {
         f.write_str(self.symbol())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_unit_finds_its_own_row() {
+        for (unit, symbol, quantity, ..) in UNITS {
+            assert_eq!((unit.row().0, unit.symbol(), unit.quantity()), (*unit, *symbol, *quantity));
+        }
+        // Of a unit without a row the index would be that of another, or none.
+        assert_eq!(UNITS.iter().map(|row| row.0 as usize).collect::<Vec<_>>(), (0..UNITS.len()).collect::<Vec<_>>());
+    }
+}

@@ -48,7 +48,7 @@ pub struct TableWriter {
 }
 
 enum WriterState {
-    Here(Open),
+    Here(Box<Open>),
     Aside(EncodingThread),
 }
 
@@ -97,17 +97,17 @@ impl TableWriter {
                 self.state = Some(WriterState::Aside(aside));
             }
             Some(WriterState::Here(open)) => self.state = Some(self.begun(open, chunk)?),
-            None => self.state = Some(self.begun(Open::new(self.schema, chunk, &self.path)?, chunk)?),
+            None => self.state = Some(self.begun(Box::new(Open::new(self.schema, chunk, &self.path)?), chunk)?),
         }
         Ok(())
     }
 
-    fn begun(&self, mut open: Open, chunk: &Frame) -> Result<WriterState> {
+    fn begun(&self, mut open: Box<Open>, chunk: &Frame) -> Result<WriterState> {
         if self.rows < GROUP_ROWS as u64 {
             open.push(chunk.batch())?;
             return Ok(WriterState::Here(open));
         }
-        let mut aside = EncodingThread::new(open);
+        let mut aside = EncodingThread::new(*open);
         aside.push(chunk.batch())?;
         Ok(WriterState::Aside(aside))
     }
@@ -120,7 +120,7 @@ impl TableWriter {
     /// Closes the file.
     pub fn finish(self) -> Result<FinishedFile> {
         let open = match self.state {
-            Some(WriterState::Here(open)) => open,
+            Some(WriterState::Here(open)) => *open,
             Some(WriterState::Aside(aside)) => aside.end()?,
             None => return Err(Error::Bug(format!("table {}: finished without a chunk", self.schema.name))),
         };

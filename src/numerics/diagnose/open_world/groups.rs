@@ -298,9 +298,9 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
     // What a joint's travel leaves behind: with every number where it is the place's own joint, with the middle one elsewhere, which is refined.
     let memory = |joint: usize, numbers: Range<usize>| {
-        let sticks = LIMITS[numbers.clone()].to_vec();
-        let sticks = sticks.into_iter().map(move |share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
-        let fades = FADING[numbers].to_vec().into_iter().map(move |time| Variable::Recent { joint, time });
+        let travel = survey.travel(joint);
+        let sticks = LIMITS[numbers.clone()].iter().map(move |share| Variable::Stretch { joint, limit: share * travel });
+        let fades = FADING[numbers].iter().map(move |time| Variable::Recent { joint, time: *time });
         let clocked = survey.data.has_clock();
         let all = sticks.chain(fades.filter(move |_| clocked)).chain([Variable::Move { joint }]);
         all.map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }))
