@@ -63,7 +63,7 @@ criteria! {
     /// names that were wrong where it was sure of them.
     MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "changes nothing on 2";
     /// That a cause which is taken out of the list is called by another name with 0.9 or more.
-    MIMICRY: f64 = 0.14, "probability", "count: 14 of 100 concealed causes of L 50 or more", "";
+    MIMICRY: f64 = 0.2, "probability", "count: 32 of 164 concealed causes of L 50 or more", "";
     /// What the criterion must lose without a name that stands beside a free form.
     SEEN: f64 = 10.0, "-2 ln of odds", "literature: very strong, Kass and Raftery (1995)", "";
     /// What a name that stands beside a free form must have of the evidence of all names there.

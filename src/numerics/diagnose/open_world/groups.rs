@@ -7,7 +7,6 @@ use crate::criteria::open_world::{
 use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
-use std::ops::Range;
 
 /// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
 const ARROWS: [[i8; 3]; 13] = [
@@ -296,19 +295,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     let passing = || [(Variable::Time, *FINE), (Variable::Temperature, *COARSE), (Variable::Payload, *COARSE)].into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
-    // What a joint's travel leaves behind: with every number where it is the place's own joint, with the middle one elsewhere, which is refined.
-    let memory = |joint: usize, numbers: Range<usize>| {
-        let travel = survey.travel(joint);
-        let sticks = LIMITS[numbers.clone()].iter().map(move |share| Variable::Stretch { joint, limit: share * travel });
-        let fades = FADING[numbers].iter().map(move |time| Variable::Recent { joint, time: *time });
+    // What a joint's travel leaves behind.
+    let moved = |joint: usize| {
+        let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
+        let fades = FADING.map(|time| Variable::Recent { joint, time });
         let clocked = survey.data.has_clock();
-        let all = sticks.chain(fades.filter(move |_| clocked)).chain([Variable::Move { joint }]);
+        let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
         all.map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }))
-    };
-    let middle = LIMITS.len() / 2;
-    let moved = |own: usize| {
-        let numbers = move |joint| if joint == own { 0..LIMITS.len() } else { middle..middle + 1 };
-        (0..joints).flat_map(move |joint| memory(joint, numbers(joint)))
     };
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
