@@ -13,7 +13,7 @@ use arrow::datatypes::{DataType, Field};
 use crate::error::{Error, Result};
 use crate::units::Unit;
 
-/// The schema files, one per table kind, as build.rs lists them.
+/// The schema files, one per table kind, as schemas/build.rs lists them.
 const SCHEMAS: &[&str] = include!(concat!(env!("OUT_DIR"), "/schemas.rs"));
 
 static PARSED: LazyLock<BTreeMap<String, TableSchema>> = LazyLock::new(|| {

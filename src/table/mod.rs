@@ -1,6 +1,6 @@
 //! The bridge between Parquet columns and Rust values: each table has a schema file in `schemas/`.
 //!
-//! Most tables are a list of rows, and a row is a struct whose fields are the columns of the schema file (build.rs reads it); only
+//! Most tables are a list of rows, and a row is a struct whose fields are the columns of the schema file (schemas/build.rs reads it); only
 //! tables with columns for each joint are written by hand. A file of this folder says how tables are filled and what is made of them.
 
 use crate::error::Result;
@@ -33,7 +33,7 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
     Ok(Loose { table: T::from_frame(&loose.table)?, vouched: loose.vouched })
 }
 
-/// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (build.rs).
+/// Declares a table as a list of rows. It is handed the columns of `schemas/<kind>.json` by a macro of the kind's name (schemas/build.rs).
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
         #[doc = concat!("A row of the table `", $kind, "`.")]

@@ -326,14 +326,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
             let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
-            let own: Vec<_> = sight
-                .into_iter()
-                .chain(passing())
-                .chain(angles(joints))
-                .chain(sides())
-                .chain(moved(joints))
-                .chain(space)
-                .collect();
+            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
         Place::Tool => {
