@@ -152,7 +152,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// Whether a name is hardly seen beside a free form, or one of many that would do there: what a free form does not follow looks like a
     /// small law of the list.
     fn is_weak(&self, key: &FindingKey, own: &ContestedName) -> bool {
-        let beside_free = (0..self.sight.judged.set.len()).any(|i| self.is_nameless(i));
+        let beside_free = (0..self.sight.judged.set.len()).any(|i| self.is_nameless(i) && !own.members.contains(&i));
         let seen = || self.loss_without(&own.members) >= *SEEN && own.share_of_names >= *SHARED;
         beside_free && key.0 != names::UNKNOWN && !seen()
     }

@@ -172,7 +172,7 @@ impl NameCase<'_, '_, '_, '_> {
     /// The least probability that it is none of the list: what the list lacks looks like a law of it at times, and no evidence tells.
     fn least(&self) -> f64 {
         let mimicry = self.open_world * *MIMICRY;
-        (mimicry / (mimicry + 1.0 - self.open_world)).max(*MISLED)
+        (mimicry / (mimicry + 1.0 - self.open_world)).clamp(*MISLED, 1.0 - *MISLED)
     }
 
     /// Evidence and fall of the squared residual of some columns of the model's causes beside a state.
