@@ -99,7 +99,9 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
         let mut beam = vec![best.clone()];
         let mut first = None;
         let mut last = 1.0;
-        while best.len() < self.options.most {
+        // What is pruned may be added again: a set that was there before ends the climb.
+        let mut seen = BTreeSet::new();
+        while best.len() < self.options.most && seen.insert(self.pool.bic(&best).to_bits()) {
             self.multiply(&best);
             last = self.gate(&best);
             first.get_or_insert(last);
