@@ -35,6 +35,10 @@ criteria! {
     MARGIN: f64 = 0.1, "share of the range", "judgement: a slope at the end of the rows stays possible", "changes nothing on 2";
     /// A variable of no more values than this is a number of its own, not a range.
     NUMBERS: usize = 3, "values", "count: three values bear no curve", "";
+    /// Places of a knot that are tried.
+    KNOTS: usize = 48, "places", "judgement: bounds time; the best are refined", "";
+    /// Places around a knot that are tried in the end.
+    CLOSER_KNOTS: usize = 8, "places", "judgement: bounds time", "";
     /// Steps in time that are tried.
     STEPS: usize = 40, "steps", "judgement: bounds time; the best is refined", "";
     /// Limits at which what sticks slips.
@@ -69,7 +73,7 @@ criteria! {
     /// What a name that stands beside a free form must have of the evidence of all names there.
     SHARED: f64 = 0.1, "share", "judgement: a name of ten is none", "";
     /// Places at which a free form is asked with more than one group.
-    PLACES: usize = 2, "places", "judgement: bounds time", "";
+    PLACES: usize = 3, "places", "judgement: bounds time", "";
     /// Functions of each variable that are looked at.
     LOOKED_AT: usize = 3, "functions", "judgement: bounds time", "";
     /// Products of a motion that become groups.

@@ -54,6 +54,16 @@ pub enum Basis {
         #[serde(default, skip_serializing_if = "Gaps::are_none")]
         gaps: Gaps,
     },
+    /// 1 between two knots, else 0; one function for each stretch, below the first knot and above the last, too.
+    Steps {
+        /// Where it steps.
+        knots: Knots,
+    },
+    /// 1 at a knot and 0 at all others, straight between them and held beyond the first and the last; one function for each knot.
+    Corners {
+        /// Where straight pieces meet, both ends among them.
+        knots: Knots,
+    },
     /// exp(-((u - centre) / width)^2).
     Bump {
         /// Its middle.
@@ -109,6 +119,52 @@ pub enum Basis {
     },
 }
 
+/// Some values of a variable, ascending.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct Knots {
+    at: [f64; Knots::MOST],
+    count: usize,
+}
+
+impl Knots {
+    /// How many there are at most.
+    pub const MOST: usize = 6;
+
+    /// The first of some values, ascending.
+    pub fn new(values: impl IntoIterator<Item = f64>) -> Self {
+        let mut out = Self { at: [0.0; Self::MOST], count: 0 };
+        for (to, value) in out.at.iter_mut().zip(values) {
+            *to = value;
+            out.count += 1;
+        }
+        out.at[..out.count].sort_by(f64::total_cmp);
+        out
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[f64] {
+        &self.at[..self.count]
+    }
+}
+
+impl TryFrom<Vec<f64>> for Knots {
+    type Error = String;
+
+    fn try_from(values: Vec<f64>) -> Result<Self, String> {
+        if values.is_empty() || values.len() > Self::MOST {
+            return Err(format!("{} knots: from 1 to {} are allowed", values.len(), Self::MOST));
+        }
+        Ok(Self::new(values))
+    }
+}
+
+impl From<Knots> for Vec<f64> {
+    fn from(knots: Knots) -> Self {
+        knots.all().to_vec()
+    }
+}
+
 /// Stretches of a curve's variable without support; none where both ends are one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gaps(pub [[f64; 2]; 2]);
@@ -145,13 +201,15 @@ impl Basis {
             Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
             Self::Sway { .. } => 2,
             Self::Cosines { count, .. } | Self::Fading { count, .. } => *count,
+            Self::Steps { knots } => knots.count + 1,
+            Self::Corners { knots } => knots.count,
             _ => 1,
         }
     }
 
     /// Whether it is a free curve.
     pub fn is_curve(&self) -> bool {
-        matches!(self, Self::Cosines { .. } | Self::Fading { .. })
+        matches!(self, Self::Cosines { .. } | Self::Fading { .. } | Self::Steps { .. } | Self::Corners { .. })
     }
 
     /// The values of its functions at `u`, numbered.
@@ -189,6 +247,18 @@ impl Basis {
                     let straight = from.zip(cosines(b, [low, high], count)).map(|(from, to)| own * from + other * to);
                     straight.enumerate().for_each(|(k, value)| each(k, share * value));
                 }
+            }
+            Self::Steps { knots } => {
+                let own = knots.all().iter().filter(|at| u > **at).count();
+                (0..=knots.count).for_each(|k| each(k, f64::from(u8::from(k == own))));
+            }
+            Self::Corners { knots } => {
+                let all = knots.all();
+                let above = all.partition_point(|at| *at < u).clamp(1, knots.count.max(2) - 1);
+                let [low, high] = [above - 1, above].map(|k| all[k.min(knots.count - 1)]);
+                let share = ((u - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let value = |k: usize| if k == above { share } else if k + 1 == above { 1.0 - share } else { 0.0 };
+                (0..knots.count).for_each(|k| each(k, value(k)));
             }
             Self::Bump { centre, width } => {
                 let distance = (u - centre) / width;
@@ -238,6 +308,26 @@ mod tests {
             let value = cosines(u, [0.0, PI], order).last().expect("one");
             assert!((value - libm::cos(order as f64 * u)).abs() < 1e-13, "{u} {order}");
         }
+    }
+
+    #[test]
+    fn steps_and_corners_are_what_their_knots_say_and_stay_so_in_json() {
+        let values = |basis: Basis, u: f64| {
+            let mut out = vec![0.0; basis.count()];
+            basis.at(u, &mut |k, value| out[k] = value);
+            out
+        };
+        let steps = Basis::Steps { knots: Knots::new([0.5, -0.5]) };
+        assert_eq!([-1.0, 0.0, 0.6].map(|u| values(steps, u)), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let corners = Basis::Corners { knots: Knots::new([-1.0, 0.0, 1.0]) };
+        let hats = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.75, 0.25], [0.0, 0.0, 1.0]];
+        assert_eq!([-3.0, -0.5, 0.25, 7.0].map(|u| values(corners, u)), hats);
+        for basis in [steps, corners] {
+            let text = serde_json::to_string(&basis).expect("JSON");
+            assert_eq!(serde_json::from_str::<Basis>(&text).expect("the same"), basis, "{text}");
+        }
+        let error = serde_json::from_str::<Basis>(r#"{"steps": {"knots": []}}"#).expect_err("no knots");
+        assert!(error.to_string().starts_with("0 knots: from 1 to 6 are allowed"), "{error}");
     }
 
     #[test]

@@ -78,7 +78,7 @@ pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
-pub use basis::{Basis, Gaps};
+pub use basis::{Basis, Gaps, Knots};
 pub use cable_drag::CableDrag;
 pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};

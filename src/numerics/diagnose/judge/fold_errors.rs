@@ -19,6 +19,11 @@ pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> 
     dealt(kind(fitter), &now.session(fitter), *FOLDS)
 }
 
+/// The same where each fold is a stretch of the recording.
+pub(super) fn stretches(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
+    dealt(FoldKind::Blocks, &now.session(fitter), *FOLDS)
+}
+
 /// Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
 fn kind(fitter: &Fitter) -> FoldKind {
     if fitter.correlated.is_some() { FoldKind::Blocks } else { FoldKind::Random(fitter.question.seed) }
@@ -78,6 +83,21 @@ impl FoldErrors {
     pub fn is_better_than(&self, other: &Self) -> bool {
         let [own, theirs] = self.rms_beside(other);
         own < theirs * (1.0 - *WORSE) && self.fall_from(other) > *CLEARLY
+    }
+
+    /// Whether this is so much better than `other` at the first or at the last of the stretches, beyond which programs and later rows lie.
+    pub fn is_better_at_an_end_than(&self, other: &Self) -> bool {
+        let rows: Vec<usize> = self.squares.keys().copied().collect();
+        let length = rows.len().div_ceil(*FOLDS);
+        let within = |ends: &[usize]| {
+            let (Some(first), Some(last)) = (ends.first(), ends.last()) else { return false };
+            let part = |errors: &Self| Self {
+                squares: errors.squares.range(*first..=*last).map(|(row, square)| (*row, *square)).collect(),
+                ..*errors
+            };
+            part(self).is_better_than(&part(other))
+        };
+        within(&rows[..length.min(rows.len())]) || within(&rows[rows.len().saturating_sub(length)..])
     }
 
     /// The rms of both at the rows that both were fitted to.

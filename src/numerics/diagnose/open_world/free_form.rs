@@ -3,6 +3,7 @@
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
 use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows};
 use super::groups::{FreeGroup, GroupColumns};
+use super::knots::with_knots;
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
 use crate::criteria::open_world::{CLOSER, GROUPS, LEVELS, PAYS};
@@ -59,6 +60,14 @@ pub(super) struct PlaceGroups {
     groups: Vec<Arc<SeenGroup>>,
 }
 
+/// What a further group of a free form stands beside.
+struct BesideTerms<'b, 'f, 'a> {
+    /// The model's causes and the terms before it.
+    state: &'b KnownCauses<'f>,
+    terms: &'b [FreeTerm],
+    around: &'b AroundGroups<'f, 'a>,
+}
+
 /// What the model's causes and the list are, beside which free forms are asked.
 pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
@@ -73,8 +82,8 @@ impl PlaceGroups {
     /// All groups; without their columns unless these are to be `kept`: only a free form of several groups needs them, beside causes alone
     /// products say all.
     pub fn of(place: Place, around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame);
-        let all = columns.of(place, around.survey);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
+        let all = columns.of(place);
         let mut out = Self { place, groups: Vec::new() };
         out.take(all, &mut columns, around, kept);
         out
@@ -82,7 +91,7 @@ impl PlaceGroups {
 
     /// With the products of two variables that what some states leave points at.
     pub fn with_pairs(&self, states: &[&KnownCauses], around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
         let mut out = self.clone();
         let new = pairs(self.place, states, around.frame, &mut columns, around.survey);
         out.take(new, &mut columns, around, kept);
@@ -148,20 +157,65 @@ impl PlaceGroups {
         closest(&(0..group.variances.len()).map(|length| group.evidence(&seen, length)).collect::<Vec<_>>())
     }
 
-    /// Moves the number of a group's variable to where its evidence is largest.
-    fn refine(&mut self, g: usize, mut log: f64, state: &KnownCauses, columns: &mut GroupColumns, around: &AroundGroups) {
-        for level in 0..*LEVELS {
+    /// Gives a group the numbers and the shape that say most, and asks so of what else a joint's travel leaves behind where it shows. Returns
+    /// what all of it adds to ln of the evidence, choices paid.
+    fn refine(&mut self, g: usize, columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
+        let start = self.paid(g, beside.state);
+        // The first group of a place decides which place it is.
+        let relatives = if beside.terms.is_empty() { columns.relatives(&self.groups[g].group) } else { Vec::new() };
+        let mut log = self.shaped((g, start), columns, beside);
+        for alike in relatives {
             let first = self.groups.len();
-            let near = columns.near(&self.groups[g].group, level);
-            self.take(near, columns, around, true);
-            let tried = (first..self.groups.len()).map(|other| (other, self.closest(other, state).0.log));
-            let best = tried.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, other)| *other > log);
-            if let Some((other, better)) = best {
-                log = better;
-                self.groups.swap(g, other);
+            self.groups.push(self.groups[g].clone());
+            let begun = self.exchanged((first, f64::NEG_INFINITY), alike, columns, beside);
+            let other = self.shaped((first, begun), columns, beside);
+            if other > log {
+                log = other;
+                self.groups.swap(g, first);
             }
             self.groups.truncate(first);
         }
+        log - start
+    }
+
+    /// Moves the numbers of a group's variables to where the evidence is largest, and gives it shorter waves, jumps or corners where these say
+    /// more; returns the evidence of what stands there.
+    fn shaped(&mut self, (g, mut log): (usize, f64), columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
+        for level in 0..*LEVELS {
+            let near = columns.near(&self.groups[g].group, level);
+            if near.is_empty() {
+                break;
+            }
+            log = self.exchanged((g, log), near, columns, beside);
+        }
+        let mut shaped: Vec<FreeGroup> = columns.finer(&self.groups[g].group).into_iter().collect();
+        shaped.extend(with_knots(&self.groups[g].group, beside.state, columns));
+        self.exchanged((g, log), shaped, columns, beside)
+    }
+
+    /// ln of the evidence of a group beside a state without the price of its place among others like it.
+    fn paid(&self, g: usize, state: &KnownCauses) -> f64 {
+        self.closest(g, state).0.log - (self.groups[g].group.of as f64).ln()
+    }
+
+    /// Puts the best of other groups in the place of one whose evidence is `log`, if it says more; returns the evidence of what stands there.
+    fn exchanged(
+        &mut self,
+        (g, log): (usize, f64),
+        others: Vec<FreeGroup>,
+        columns: &mut GroupColumns,
+        beside: &BesideTerms,
+    ) -> f64 {
+        let first = self.groups.len();
+        let others = others.into_iter().filter(|other| is_new(other, beside.terms)).collect();
+        self.take(others, columns, beside.around, true);
+        let tried = (first..self.groups.len()).map(|other| (other, self.paid(other, beside.state)));
+        let best = tried.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, other)| *other > log);
+        if let Some((other, _)) = best {
+            self.groups.swap(g, other);
+        }
+        self.groups.truncate(first);
+        best.map_or(log, |(_, better)| better)
     }
 
     /// The price of a group's choice: all motions and variables alike, and within a motion that steps all times.
@@ -185,7 +239,7 @@ impl PlaceGroups {
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
         let (mut now, mut terms): (_, Vec<FreeTerm>) = (state.clone(), Vec::new());
         let mut log = f64::NEG_INFINITY;
-        let mut columns = GroupColumns::new(around.frame);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
         for step in 0..*GROUPS {
             let scan = self.scan(&now);
             let paid = |g: usize| scan[g].0.log - self.price(g);
@@ -201,7 +255,7 @@ impl PlaceGroups {
             } else {
                 log += paid(best);
             }
-            self.refine(best, scan[best].0.log, &now, &mut columns, around);
+            log += self.refine(best, &mut columns, &BesideTerms { state: &now, terms: &terms, around });
             let (found, length) = self.closest(best, &now);
             let square = found.amplitude * found.amplitude;
             let seen = self.groups[best].clone();
@@ -210,7 +264,7 @@ impl PlaceGroups {
             let group = seen.group;
             terms.push(FreeTerm { group, variances });
             if step == 0 {
-                let products = columns.products(&group, around.survey);
+                let products = columns.products(&group);
                 self.take(products, &mut columns, around, true);
             }
         }

@@ -4,7 +4,7 @@ use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::criteria::open_world::{
     COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
-use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
+use crate::effect::{Axes, Basis, Factor, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
@@ -26,6 +26,9 @@ const ARROWS: [[i8; 3]; 13] = [
 ];
 /// Shorter links (m) have no free form of their own.
 const SHORT: f64 = 1e-3;
+
+/// What passes with a recording, and is often changed together.
+const PASSING: [Variable; 3] = [Variable::Time, Variable::Temperature, Variable::Payload];
 
 /// A motion, and functions of the recording's variables that it follows.
 #[derive(Debug, Clone, Copy)]
@@ -104,18 +107,19 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
 
 /// Directions of motions and values of variables at every row, computed once.
 pub(super) struct GroupColumns<'f, 'a> {
-    frame: &'f ProjectedRows<'a>,
+    pub frame: &'f ProjectedRows<'a>,
+    survey: &'f Survey<'f>,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
 impl<'f, 'a> GroupColumns<'f, 'a> {
-    pub fn new(frame: &'f ProjectedRows<'a>) -> Self {
-        Self { frame, directions: Vec::new(), values: Vec::new() }
+    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>) -> Self {
+        Self { frame, survey, directions: Vec::new(), values: Vec::new() }
     }
 
     /// A variable at every row, where every row tells it.
-    fn values(&mut self, of: Variable) -> Option<&[f64]> {
+    pub fn values(&mut self, of: Variable) -> Option<&[f64]> {
         if !self.values.iter().any(|(other, _)| *other == of) {
             self.values.push((of, self.frame.values(of)));
         }
@@ -130,11 +134,17 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             let times = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).collect();
             functions = functions.iter().flat_map(|a| own.iter().map(move |b| times(a, b))).collect();
         }
-        if !self.directions.iter().any(|(other, _)| *other == group.motion) {
-            self.directions.push((group.motion, self.frame.directions(group.motion)));
-        }
-        let directions = self.directions.iter().find(|(other, _)| *other == group.motion).map(|(_, all)| all.as_slice())?;
-        Some(self.frame.free(directions, &functions))
+        Some(self.along(group.motion, &functions))
+    }
+
+    /// Columns of a motion along some functions of the rows, before geometry is projected off.
+    pub fn along(&mut self, motion: Motion, functions: &[Vec<f64>]) -> Vec<f64> {
+        let known = self.directions.iter().position(|(other, _)| *other == motion);
+        let at = known.unwrap_or_else(|| {
+            self.directions.push((motion, self.frame.directions(motion)));
+            self.directions.len() - 1
+        });
+        self.frame.free(&self.directions[at].1, functions)
     }
 
     /// A smooth function, or a straight one of what has few values; none of what hardly varies.
@@ -157,6 +167,14 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         Some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
     }
 
+    /// The same in a product: what has few values multiplies the other variable's function in one of them and need not in another.
+    fn factor(&mut self, of: Variable, count: usize) -> Option<Basis> {
+        Some(match self.basis(of, count)? {
+            Basis::Linear { zero, per } => Basis::Straight { zero, per },
+            curve => curve,
+        })
+    }
+
     /// The share of a variable's variance that a smooth function of another one tells.
     fn follows(&mut self, of: Variable, by: Variable) -> f64 {
         let Some(told) = self.functions(by, *TOLD_BY) else { return 0.0 };
@@ -174,7 +192,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         self.at_rows(of, &basis)
     }
 
-    fn at_rows(&mut self, of: Variable, basis: &Basis) -> Option<Vec<Vec<f64>>> {
+    /// Functions of a variable at every row, function by function; none where some row does not tell it.
+    pub fn at_rows(&mut self, of: Variable, basis: &Basis) -> Option<Vec<Vec<f64>>> {
         let values = self.values(of)?;
         let mut out = vec![vec![0.0; values.len()]; basis.count()];
         values.iter().enumerate().for_each(|(row, u)| basis.at(*u, &mut |k, value| out[k][row] = value));
@@ -182,8 +201,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     }
 
     /// All groups of a place.
-    pub fn of(&mut self, place: Place, survey: &Survey) -> Vec<FreeGroup> {
-        let mut out = Vec::new();
+    pub fn of(&mut self, place: Place) -> Vec<FreeGroup> {
+        let (mut out, survey) = (Vec::new(), self.survey);
         for (motion, variables) in motions(place, survey) {
             for (of, count) in variables {
                 if let Some(basis) = self.basis(of, count) {
@@ -201,36 +220,86 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         out
     }
 
-    /// Groups like one whose variable has a number of its own, with others around it, closer with every level.
+    /// Groups like one in which a variable has a number of its own, with others around it, closer with every level.
     pub fn near(&mut self, group: &FreeGroup, level: i32) -> Vec<FreeGroup> {
-        if group.law.times.is_some() {
-            return Vec::new();
-        }
         let step = libm::exp2(-f64::from(level));
         let factors = [libm::exp2(0.5 * step), libm::exp2(-0.5 * step)];
-        let variables: Vec<Variable> = match group.law.first.of {
-            Variable::Position { along } => {
-                arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Position { along }).collect()
+        let around = |of: Variable| -> Vec<Variable> {
+            match of {
+                Variable::Position { along } => {
+                    arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Position { along }).collect()
+                }
+                Variable::Sighted { along } => {
+                    arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Sighted { along }).collect()
+                }
+                Variable::Stretch { joint, limit } => factors.map(|by| Variable::Stretch { joint, limit: limit * by }).to_vec(),
+                Variable::Recent { joint, time } => factors.map(|by| Variable::Recent { joint, time: time * by }).to_vec(),
+                _ => Vec::new(),
             }
-            Variable::Sighted { along } => {
-                arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Sighted { along }).collect()
-            }
-            Variable::Stretch { joint, limit } => factors.map(|by| Variable::Stretch { joint, limit: limit * by }).to_vec(),
-            Variable::Recent { joint, time } => factors.map(|by| Variable::Recent { joint, time: time * by }).to_vec(),
-            _ => Vec::new(),
         };
-        let one = |of: Variable| Some(FreeGroup { law: Law::new(of, self.basis(of, *FINE)?), ..*group });
-        let first = (level == 0 && !variables.is_empty()).then_some(group.law.first.of);
-        first.into_iter().chain(variables).filter_map(one).collect()
+        self.with_other_variables(group, around)
+    }
+
+    /// Groups like one with what goes along with a variable that shows: what else a joint's travel leaves behind, what else passes with the
+    /// recording; of each kind a list.
+    pub fn relatives(&mut self, group: &FreeGroup) -> Vec<Vec<FreeGroup>> {
+        let survey = self.survey;
+        let kind = |of: &Variable| std::mem::discriminant(of);
+        let others = |of: Variable| -> Vec<Variable> {
+            let all: Vec<Variable> = match of {
+                Variable::Angle { joint } | Variable::Approach { joint } | Variable::Move { joint } => moved(joint, survey).collect(),
+                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => moved(joint, survey).collect(),
+                // By themselves these are asked at every place.
+                _ if group.law.times.is_some() && PASSING.contains(&of) => PASSING.to_vec(),
+                _ => Vec::new(),
+            };
+            all.into_iter().filter(|other| kind(other) != kind(&of)).collect()
+        };
+        let kinds = |group: &FreeGroup| group.law.variables().iter().map(kind).collect::<Vec<_>>();
+        let mut out: Vec<Vec<FreeGroup>> = Vec::new();
+        for other in self.with_other_variables(group, others) {
+            match out.iter_mut().find(|alike| kinds(&alike[0]) == kinds(&other)) {
+                Some(alike) => alike.push(other),
+                None => out.push(vec![other]),
+            }
+        }
+        out
+    }
+
+    /// A group with others in the place of each of its variables.
+    fn with_other_variables(&mut self, group: &FreeGroup, others: impl Fn(Variable) -> Vec<Variable>) -> Vec<FreeGroup> {
+        let Law { first, times } = group.law;
+        let count = if times.is_some() { *EACH } else { *FINE };
+        let mut laws = Vec::new();
+        let mut basis = |of: Variable| if times.is_some() { self.factor(of, count) } else { self.basis(of, count) };
+        for of in others(first.of) {
+            laws.extend(basis(of).map(|basis| Law { first: Factor::new(of, basis), times }));
+        }
+        for of in times.map_or(Vec::new(), |times| others(times.of)) {
+            laws.extend(basis(of).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
+        }
+        let of = |law: &Law| if times.is_some() { group.of } else { alike(law.first.of) };
+        laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()
+    }
+
+    /// A group with more and shorter waves.
+    pub fn finer(&mut self, group: &FreeGroup) -> Option<FreeGroup> {
+        let curves = group.law.factors().filter(|factor| factor.basis.is_curve()).count();
+        let count = if curves > 1 { *COARSE } else { *FINEST };
+        let two = group.law.times.is_some();
+        let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
+        let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
+        let law = Law { first: finer(group.law.first)?, times: group.law.times.and_then(&mut finer) };
+        (law.count() > group.law.count()).then_some(FreeGroup { law, ..*group })
     }
 
     /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
-    pub fn products(&mut self, group: &FreeGroup, survey: &Survey) -> Vec<FreeGroup> {
+    pub fn products(&mut self, group: &FreeGroup) -> Vec<FreeGroup> {
         if group.law.times.is_some() || matches!(group.law.first.basis, Basis::After { .. }) {
             return Vec::new();
         }
         let of = group.law.first.of;
-        let all = motions(group.place(), survey);
+        let all = motions(group.place(), self.survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
         // What has a number of its own to be found is no second factor.
         let single: Vec<Variable> = others.map(|(other, _)| other).filter(|other| *other != of && alike(*other) == 1).collect();
@@ -239,7 +308,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
 
     /// The product of two variables, where the rows show one: neither follows the other.
     pub fn product(&mut self, motion: Motion, [first, second]: [Variable; 2], of: usize) -> Option<FreeGroup> {
-        let law = Law::new(first, self.basis(first, *EACH)?).times(second, self.basis(second, *EACH)?);
+        let law = Law::new(first, self.factor(first, *EACH)?).times(second, self.factor(second, *EACH)?);
         let told = self.follows(first, second).max(self.follows(second, first));
         (told <= *TOLD).then_some(FreeGroup { motion, law, of })
     }
@@ -292,16 +361,12 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     let joints = survey.joints();
     let angles =
         |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
-    let passing = || [(Variable::Time, *FINE), (Variable::Temperature, *COARSE), (Variable::Payload, *COARSE)].into_iter();
+    let passing = || PASSING.map(|of| (of, if of == Variable::Time { *FINE } else { *COARSE })).into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
-    // What a joint's travel leaves behind.
     let moved = |joint: usize| {
-        let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
-        let fades = FADING.map(|time| Variable::Recent { joint, time });
-        let clocked = survey.data.has_clock();
-        let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
-        all.map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }))
+        let own = moved(joint, survey).map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }));
+        own.chain(others(joint, survey))
     };
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
@@ -326,7 +391,9 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
             let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
-            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
+            let moves = others(joints, survey);
+            let own: Vec<_> =
+                sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(moves).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
         Place::Tool => {
@@ -337,11 +404,24 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
             vec![(Motion::Tool { axes: Axes::Place }, own)]
         }
         _ => {
-            let loads = (0..joints.min(3)).filter_map(load);
+            let loads = (0..joints).filter_map(load);
             let own: Vec<_> = angles(0).chain(passing()).chain(sides()).chain(loads).chain(moved(0)).chain(space()).collect();
             [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
         }
     }
+}
+
+/// What a joint's travel may leave behind.
+fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Variable> {
+    let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
+    let fades = FADING.map(|time| Variable::Recent { joint, time });
+    let clocked = survey.data.has_clock();
+    sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }])
+}
+
+/// The last moves of the other joints: what else they leave behind is asked of those that show.
+fn others(joint: usize, survey: &Survey) -> impl Iterator<Item = (Variable, usize)> {
+    (0..survey.joints()).filter(move |other| *other != joint).map(|joint| (Variable::Move { joint }, *SKETCH))
 }
 
 /// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.

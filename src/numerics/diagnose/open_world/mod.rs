@@ -11,6 +11,7 @@ mod evidence;
 mod frame;
 mod free_form;
 mod groups;
+mod knots;
 mod look;
 mod names;
 mod pairs;

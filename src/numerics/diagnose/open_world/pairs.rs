@@ -22,7 +22,7 @@ pub(super) fn pairs(
     }
     let mut out = Vec::new();
     for (motion, variables) in motions(place, survey) {
-        let known = variables.iter().map(|(of, _)| *of).filter(|of| alike(*of) == 1);
+        let known = variables.iter().map(|(of, _)| *of).filter(|of| alike(*of) == 1 && !is_another_joints_move(*of, place));
         let known: Vec<(Variable, Vec<Vec<f64>>)> =
             known.filter_map(|of| Some((of, columns.functions(of, *LOOKED_AT)?))).collect();
         let seen = SeenMotion::of(motion, &left, frame);
@@ -39,6 +39,11 @@ pub(super) fn pairs(
         out.extend(scores.iter().filter(|(_, score)| *score > price).filter_map(of).take(*PICKED));
     }
     out
+}
+
+/// Whether a variable is the last move of a joint that is not the place's own: too many for pairs without a factor that shows.
+fn is_another_joints_move(of: Variable, place: Place) -> bool {
+    matches!(of, Variable::Move { joint } if place != Place::Joint(joint))
 }
 
 /// What a motion along each of its directions has to do with what is left, row by row.

@@ -1,10 +1,11 @@
 //! A model changed: causes taken out, laws and free forms put in, fitted anew and held against folds.
 
 use super::free_form::FreeTerm;
-use crate::diagnose::judge::{FoldErrors, JudgedCauses};
+use crate::criteria::open_world::WORSE;
+use crate::diagnose::judge::{Alternatives, FoldErrors, JudgedCauses};
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
-use crate::effect::Hypothesis;
+use crate::effect::{Hypothesis, Variable};
 use crate::estimate::Prior;
 
 /// A changed model.
@@ -53,7 +54,44 @@ impl ModelChange<'_, '_> {
         before.zip(after).is_some_and(|(before, after)| after.is_better_than(&before))
     }
 
+    /// With those of some terms that folds need.
     fn of_terms(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
+        let mut terms = terms.to_vec();
+        loop {
+            let step = self.with_terms(&terms, sentence.clone())?;
+            let Some(gone) = self.superfluous(&step) else { return Some(step) };
+            terms.remove(gone);
+        }
+    }
+
+    /// The new cause, by its number among these, that other poses or other stretches of the recording are predicted without as well, if the
+    /// step has several.
+    fn superfluous(&self, step: &ModelStep) -> Option<usize> {
+        if step.new.len() < 2 {
+            return None;
+        }
+        let (state, fitter) = (&step.state, self.fitter);
+        let (poses, stretches) = (Alternatives::of(state, fitter, &[])?, Alternatives::of_stretches(state, fitter)?);
+        let [near_poses, near_stretches] = [poses.near()?, stretches.near()?];
+        let [seen_poses, seen_stretches] = [FoldErrors::of(state, fitter)?, FoldErrors::of_stretches(state, fitter)?];
+        let gain = |k: usize| {
+            let member = [step.kept.len() + k];
+            let (bare, stretches) = (near_poses.errors(&member, None)?, near_stretches.errors(&member, None)?);
+            let drifts = step.new[k].form.variables().contains(&Variable::Time);
+            let gain = seen_poses.gain_over(&bare);
+            let carries = if drifts {
+                seen_stretches.is_better_than(&stretches)
+            } else {
+                seen_stretches.gain_over(&stretches) >= 0.0 && !stretches.is_better_at_an_end_than(&seen_stretches)
+            };
+            Some((carries && gain > *WORSE * bare.rms(), gain))
+        };
+        let gains = (0..step.new.len()).filter_map(|k| Some((gain(k)?, k)));
+        let least = gains.filter(|((needed, _), _)| !needed).min_by(|a, b| a.0.1.total_cmp(&b.0.1))?;
+        Some(least.1)
+    }
+
+    fn with_terms(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
         let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis()).collect();
         let prior = |variance: &f64| Prior { mean: 0.0, sigma: variance.sqrt() };
         let cause = |(hypothesis, term): (&Hypothesis, &FreeTerm)| EstimatedCause {
