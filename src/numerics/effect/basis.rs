@@ -257,7 +257,15 @@ impl Basis {
                 let above = all.partition_point(|at| *at < u).clamp(1, knots.count.max(2) - 1);
                 let [low, high] = [above - 1, above].map(|k| all[k.min(knots.count - 1)]);
                 let share = ((u - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                let value = |k: usize| if k == above { share } else if k + 1 == above { 1.0 - share } else { 0.0 };
+                let value = |k: usize| {
+                    if k == above {
+                        share
+                    } else if k + 1 == above {
+                        1.0 - share
+                    } else {
+                        0.0
+                    }
+                };
                 (0..knots.count).for_each(|k| each(k, value(k)));
             }
             Self::Bump { centre, width } => {

@@ -1,6 +1,6 @@
 //! Changes at one moment: what `zero_shift`, `base_shift` and `tool_shift` have in common.
 
-use super::{Basis, Cause, Hypothesis, Law, Measure, Motion, Survey, Term, Variable};
+use super::{Basis, Cause, Form, Hypothesis, Law, Measure, Motion, Place, Survey, Term, Variable, names};
 
 /// Change points tried at first; the best is refined to every one.
 const CHANGES: usize = 40;
@@ -25,8 +25,71 @@ pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
     term.with_bases(others).into_iter().filter(|term| is_its_own(term, survey)).collect()
 }
 
+/// What may have moved, as far as these data tell, when the payload changed for the only time: of a joint or a tool that follows the payload.
+pub fn moved_with_the_payload(form: &Form, survey: &Survey) -> Option<(&'static str, Place)> {
+    let term = form.term().filter(|term| survey.payload_changes_once() && term.law().variables() == [Variable::Payload])?;
+    match term.motion() {
+        Motion::Joint { joint } => Some((names::ZERO_SHIFT, Place::Joint(joint))),
+        Motion::Tool { .. } => Some((names::TOOL_SHIFT, Place::Tool)),
+        _ => None,
+    }
+}
+
 /// Whether no change of the payload would do the same.
 fn is_its_own(term: &Term, survey: &Survey) -> bool {
     let by_payload = |at| !matches!(term.motion(), Motion::Base { .. }) && survey.is_payload_change(at);
     !matches!(term.basis(), Basis::After { at } if by_payload(at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Unknown;
+    use crate::robot::import::{RobotFileText, read_calib};
+    use crate::robot::{Measurements, PointReadings, RobotModel};
+    use nalgebra::Vector3;
+
+    const ROBOT: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+tool: {point: [500, 0, 400]}
+joints: [{name: A1}, {name: A2}]
+";
+    const ROWS: usize = 60;
+
+    /// What may have moved with the payload of a joint that follows it, and whether a zero that moves in the middle is proposed.
+    fn told(payload: impl Fn(usize) -> f64) -> (Option<(&'static str, Place)>, bool) {
+        let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+        let data = Measurements {
+            joints: 2,
+            q: (0..2 * ROWS).map(|k| (k as f64 * 0.7).sin()).collect(),
+            points: PointReadings::new(vec![Vector3::zeros(); ROWS], 1e-5),
+            payload: (0..ROWS).map(payload).collect(),
+            time: Some((0..ROWS).map(|row| 10.0 * row as f64).collect()),
+            ..Measurements::default()
+        };
+        let rows: Vec<usize> = (0..ROWS).collect();
+        let (torque, compliance) = (vec![0.0; 2 * ROWS], vec![0.0; 2]);
+        let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
+        let joint = Motion::Joint { joint: 1 };
+        let form = Form::from(Term::new(&Unknown, joint, Law::of(Variable::Payload)));
+        let middle = |hypothesis: &Hypothesis| {
+            let basis = hypothesis.form.term().map(Term::basis);
+            matches!(basis, Some(Basis::After { at }) if (at - 295.0).abs() < 10.0)
+        };
+        (moved_with_the_payload(&form, &survey), propose(&Unknown, &[joint], &survey).iter().any(middle))
+    }
+
+    #[test]
+    fn what_follows_a_payload_that_changes_once_may_have_moved_then_and_no_zero_is_proposed_in_its_stead() {
+        let shift = Some((names::ZERO_SHIFT, Place::Joint(1)));
+        assert_eq!(told(|row| if row < ROWS / 2 { 0.0 } else { 5.0 }), (shift, false));
+        assert_eq!(told(|row| if row % 10 < 5 { 0.0 } else { 5.0 }), (None, true));
+        // The lightest two of three payloads differ, too.
+        assert_eq!(told(|row| [0.0, 2.0, 5.0][3 * row / ROWS]), (None, true));
+    }
 }

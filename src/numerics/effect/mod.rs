@@ -81,6 +81,7 @@ pub use base_frame::{BaseFrame, BasePlacement};
 pub use basis::{Basis, Gaps, Knots};
 pub use cable_drag::CableDrag;
 pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
+pub use change::moved_with_the_payload;
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};

@@ -61,14 +61,17 @@ impl<'a> Survey<'a> {
         out
     }
 
-    /// When the payload changes (s), from light to heavy or back, where it does so once.
+    /// When the payload changes (s), where it does so once.
     fn only_payload_change(&self) -> Option<f64> {
-        let heavy = self.heavy_payload();
-        let mut by_time: Vec<(f64, bool)> =
-            self.rows.iter().map(|row| (self.data.time(*row), self.data.payload[*row] > heavy)).collect();
+        let mut by_time: Vec<(f64, f64)> = self.rows.iter().map(|row| (self.data.time(*row), self.data.payload[*row])).collect();
         by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut changes = by_time.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| 0.5 * (pair[0].0 + pair[1].0));
         changes.next().filter(|_| changes.next().is_none())
+    }
+
+    /// Whether the payload changes once, so that what follows it may as well have moved then.
+    pub fn payload_changes_once(&self) -> bool {
+        self.payload_change.is_some()
     }
 
     /// Whether what steps at a time may as well follow the payload, which changes once, and about then.

@@ -4,7 +4,7 @@ use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::criteria::open_world::{
     COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
-use crate::effect::{Axes, Basis, Factor, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
+use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
@@ -28,7 +28,7 @@ const ARROWS: [[i8; 3]; 13] = [
 const SHORT: f64 = 1e-3;
 
 /// What passes with a recording, and is often changed together.
-const PASSING: [Variable; 3] = [Variable::Time, Variable::Temperature, Variable::Payload];
+pub(super) const PASSING: [Variable; 3] = [Variable::Time, Variable::Temperature, Variable::Payload];
 
 /// A motion, and functions of the recording's variables that it follows.
 #[derive(Debug, Clone, Copy)]
@@ -108,7 +108,7 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
 /// Directions of motions and values of variables at every row, computed once.
 pub(super) struct GroupColumns<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
-    survey: &'f Survey<'f>,
+    pub survey: &'f Survey<'f>,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
@@ -148,7 +148,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     }
 
     /// A smooth function, or a straight one of what has few values; none of what hardly varies.
-    fn basis(&mut self, of: Variable, count: usize) -> Option<Basis> {
+    pub fn basis(&mut self, of: Variable, count: usize) -> Option<Basis> {
         let values = self.values(of)?;
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
         let span = high - low;
@@ -168,7 +168,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     }
 
     /// The same in a product: what has few values multiplies the other variable's function in one of them and need not in another.
-    fn factor(&mut self, of: Variable, count: usize) -> Option<Basis> {
+    pub fn factor(&mut self, of: Variable, count: usize) -> Option<Basis> {
         Some(match self.basis(of, count)? {
             Basis::Linear { zero, per } => Basis::Straight { zero, per },
             curve => curve,
@@ -220,79 +220,6 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         out
     }
 
-    /// Groups like one in which a variable has a number of its own, with others around it, closer with every level.
-    pub fn near(&mut self, group: &FreeGroup, level: i32) -> Vec<FreeGroup> {
-        let step = libm::exp2(-f64::from(level));
-        let factors = [libm::exp2(0.5 * step), libm::exp2(-0.5 * step)];
-        let around = |of: Variable| -> Vec<Variable> {
-            match of {
-                Variable::Position { along } => {
-                    arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Position { along }).collect()
-                }
-                Variable::Sighted { along } => {
-                    arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Sighted { along }).collect()
-                }
-                Variable::Stretch { joint, limit } => factors.map(|by| Variable::Stretch { joint, limit: limit * by }).to_vec(),
-                Variable::Recent { joint, time } => factors.map(|by| Variable::Recent { joint, time: time * by }).to_vec(),
-                _ => Vec::new(),
-            }
-        };
-        self.with_other_variables(group, around)
-    }
-
-    /// Groups like one with what goes along with a variable that shows: what else a joint's travel leaves behind, what else passes with the
-    /// recording; of each kind a list.
-    pub fn relatives(&mut self, group: &FreeGroup) -> Vec<Vec<FreeGroup>> {
-        let survey = self.survey;
-        let kind = |of: &Variable| std::mem::discriminant(of);
-        let others = |of: Variable| -> Vec<Variable> {
-            let all: Vec<Variable> = match of {
-                Variable::Angle { joint } | Variable::Approach { joint } | Variable::Move { joint } => moved(joint, survey).collect(),
-                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => moved(joint, survey).collect(),
-                // By themselves these are asked at every place.
-                _ if group.law.times.is_some() && PASSING.contains(&of) => PASSING.to_vec(),
-                _ => Vec::new(),
-            };
-            all.into_iter().filter(|other| kind(other) != kind(&of)).collect()
-        };
-        let kinds = |group: &FreeGroup| group.law.variables().iter().map(kind).collect::<Vec<_>>();
-        let mut out: Vec<Vec<FreeGroup>> = Vec::new();
-        for other in self.with_other_variables(group, others) {
-            match out.iter_mut().find(|alike| kinds(&alike[0]) == kinds(&other)) {
-                Some(alike) => alike.push(other),
-                None => out.push(vec![other]),
-            }
-        }
-        out
-    }
-
-    /// A group with others in the place of each of its variables.
-    fn with_other_variables(&mut self, group: &FreeGroup, others: impl Fn(Variable) -> Vec<Variable>) -> Vec<FreeGroup> {
-        let Law { first, times } = group.law;
-        let count = if times.is_some() { *EACH } else { *FINE };
-        let mut laws = Vec::new();
-        let mut basis = |of: Variable| if times.is_some() { self.factor(of, count) } else { self.basis(of, count) };
-        for of in others(first.of) {
-            laws.extend(basis(of).map(|basis| Law { first: Factor::new(of, basis), times }));
-        }
-        for of in times.map_or(Vec::new(), |times| others(times.of)) {
-            laws.extend(basis(of).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
-        }
-        let of = |law: &Law| if times.is_some() { group.of } else { alike(law.first.of) };
-        laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()
-    }
-
-    /// A group with more and shorter waves.
-    pub fn finer(&mut self, group: &FreeGroup) -> Option<FreeGroup> {
-        let curves = group.law.factors().filter(|factor| factor.basis.is_curve()).count();
-        let count = if curves > 1 { *COARSE } else { *FINEST };
-        let two = group.law.times.is_some();
-        let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
-        let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
-        let law = Law { first: finer(group.law.first)?, times: group.law.times.and_then(&mut finer) };
-        (law.count() > group.law.count()).then_some(FreeGroup { law, ..*group })
-    }
-
     /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
     pub fn products(&mut self, group: &FreeGroup) -> Vec<FreeGroup> {
         if group.law.times.is_some() || matches!(group.law.first.basis, Basis::After { .. }) {
@@ -325,17 +252,8 @@ pub(super) fn alike(of: Variable) -> usize {
 }
 
 /// Directions of the tool's position.
-fn arrows() -> impl Iterator<Item = [f64; 3]> {
+pub(super) fn arrows() -> impl Iterator<Item = [f64; 3]> {
     ARROWS.iter().map(|arrow| Vector3::from(*arrow).map(f64::from).normalize().into())
-}
-
-/// Unit vectors off one by an angle, across it.
-fn arrows_near(along: [f64; 3], angle: f64) -> Vec<[f64; 3]> {
-    let along = Vector3::from(along);
-    let least = Vector3::ith(along.iamin(), 1.0);
-    let across = along.cross(&least).normalize();
-    let sides = [across, along.cross(&across)];
-    sides.iter().flat_map(|side| [1.0, -1.0].map(|sign| (along + side * (sign * libm::tan(angle))).normalize().into())).collect()
 }
 
 /// Whether what moves so may step at a time.
@@ -412,7 +330,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
 }
 
 /// What a joint's travel may leave behind.
-fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Variable> {
+pub(super) fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Variable> {
     let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
     let fades = FADING.map(|time| Variable::Recent { joint, time });
     let clocked = survey.data.has_clock();
@@ -437,22 +355,5 @@ fn name_of(group: &FreeGroup) -> Option<&'static str> {
             ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some(names::CABLE_DRAG)
         }
         _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn directions_near_one_are_off_it_by_the_angle_that_was_asked() {
-        for along in arrows() {
-            let near = arrows_near(along, 0.2);
-            assert_eq!(near.len(), 4);
-            for other in near {
-                let (a, b) = (Vector3::from(along), Vector3::from(other));
-                assert!((b.norm() - 1.0).abs() < 1e-12 && (a.angle(&b) - 0.2).abs() < 1e-9, "{along:?} {other:?}");
-            }
-        }
     }
 }

@@ -18,6 +18,7 @@ mod pairs;
 mod settle;
 mod state;
 mod step;
+mod variants;
 
 pub(crate) use names::NameOdds;
 pub(crate) use settle::settle;

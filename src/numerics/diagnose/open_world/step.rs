@@ -1,7 +1,6 @@
 //! A model changed: causes taken out, laws and free forms put in, fitted anew and held against folds.
 
 use super::free_form::FreeTerm;
-use crate::criteria::open_world::WORSE;
 use crate::diagnose::judge::{Alternatives, FoldErrors, JudgedCauses};
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
@@ -82,9 +81,9 @@ impl ModelChange<'_, '_> {
             let carries = if drifts {
                 seen_stretches.is_better_than(&stretches)
             } else {
-                seen_stretches.gain_over(&stretches) >= 0.0 && !stretches.is_better_at_an_end_than(&seen_stretches)
+                !stretches.is_better_than(&seen_stretches) && !stretches.is_better_at_an_end_than(&seen_stretches)
             };
-            Some((carries && gain > *WORSE * bare.rms(), gain))
+            Some((carries && gain > 0.0, gain))
         };
         let gains = (0..step.new.len()).filter_map(|k| Some((gain(k)?, k)));
         let least = gains.filter(|((needed, _), _)| !needed).min_by(|a, b| a.0.1.total_cmp(&b.0.1))?;

@@ -89,7 +89,7 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let rest = without(pool, &whole.set, &own);
     let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
     let mut rivals = rivals(last, &rest, &own, whole.bic, (effect, place));
-    exact(effect, &forms, &mut rivals);
+    exact(effect, &forms, last.survey, &mut rivals);
     let modelled = modelled(last, effect, &forms);
     if let Some((effect, place)) = modelled.as_ref().map(|modelled| modelled.same)
         && !rivals.iter().any(|rival| (rival.effect, rival.place) == (effect, place))

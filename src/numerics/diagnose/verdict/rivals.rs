@@ -4,7 +4,7 @@ use super::last_round::LastRound;
 use crate::criteria::search::EQUIVALENT;
 use crate::criteria::words::FIRM;
 use crate::diagnose::types::RivalCause;
-use crate::effect::{Form, Place};
+use crate::effect::{Form, Place, Survey, moved_with_the_payload};
 
 /// Other single causes that do as well in place of `own`, with numbers that they can have.
 pub(super) fn rivals(last: &LastRound, rest: &[usize], own: &[usize], bic: f64, named: (&str, Place)) -> Vec<RivalCause> {
@@ -41,9 +41,10 @@ fn is_possible(last: &LastRound, set: &[usize], h: usize) -> bool {
     form.impossible(&own, &error, last.survey).is_none()
 }
 
-/// Identities of kinematics and statics, whatever the data.
-pub(super) fn exact(effect: &str, forms: &[Form], rivals: &mut Vec<RivalCause>) {
-    for (other, place) in forms.iter().flat_map(|form| form.identities(effect)) {
+/// Identities of kinematics and statics, whatever the data; and what may have moved when a payload changed that changes only once.
+pub(super) fn exact(effect: &str, forms: &[Form], survey: &Survey, rivals: &mut Vec<RivalCause>) {
+    let moved = forms.iter().filter_map(|form| moved_with_the_payload(form, survey));
+    for (other, place) in forms.iter().flat_map(|form| form.identities(effect)).chain(moved) {
         if !rivals.iter().any(|rival| rival.effect == other && rival.place == place) {
             rivals.push(RivalCause { effect: other, place, delta_bic: 0.0, probability: 0.0 });
         }

@@ -1,6 +1,6 @@
 //! What a law without a name is a function of and how, in words.
 
-use crate::effect::{Axes, Basis, Clock, Motion, Polar, Term, Variable, figure};
+use crate::effect::{Axes, Basis, Clock, Motion, Place, Polar, Term, Variable, figure};
 
 /// A position or width of a joint.
 fn position(q: f64, slides: bool) -> String {
@@ -54,6 +54,23 @@ pub(super) fn in_words(term: &Term, slides: bool, clock: Clock) -> String {
             None => "depends on the warm-up".into(),
         },
         (_, Variable::Payload) => "differs with the payload".into(),
-        _ => format!("function of {of}"),
+        _ => format!("function of {of}{}", knots_in_words(term, slides)),
     }
+}
+
+/// Where a function steps or turns; places of what the joint itself does.
+fn knots_in_words(term: &Term, slides: bool) -> String {
+    let knots = term.law().factors().find_map(|factor| match factor.basis {
+        Basis::Steps { knots } => Some(("steps", knots.all().to_vec(), factor.of)),
+        Basis::Corners { knots } => Some(("turns", knots.all()[1..knots.all().len() - 1].to_vec(), factor.of)),
+        _ => None,
+    });
+    let Some((does, knots, of)) = knots else { return String::new() };
+    let own = match of {
+        Variable::Angle { joint } | Variable::Move { joint } => term.motion().place() == Place::Joint(joint),
+        Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => term.motion().place() == Place::Joint(joint),
+        _ => false,
+    };
+    let places: Vec<String> = knots.iter().map(|at| position(*at, slides)).collect();
+    if own { format!(" that {does} at {}", places.join(" and ")) } else { format!(" that {does}") }
 }
