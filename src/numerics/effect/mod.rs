@@ -112,7 +112,7 @@ pub use volume::Closing;
 pub use words::{Clock, figure};
 pub use zero_shift::ZeroShift;
 
-use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel, RowTime};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -130,9 +130,6 @@ pub struct ParameterSpec {
     /// One sigma of what is known before any measurement, SI; wide.
     pub prior_sigma: f64,
 }
-
-/// s; later than anything recorded, so that steps have happened and the arm is warm.
-pub const LONG_AFTER: f64 = 1e9;
 
 /// The circumstances of one row that effects may depend on.
 #[derive(Debug, Clone, Copy)]
@@ -182,9 +179,12 @@ impl<'a> ArmState<'a> {
         self.data.current(self.row)
     }
 
-    /// s; the number of the row where the recording has no clock.
+    /// s, or the number of the row where the recording has no clock; infinite long after the recording, where laws take their limit.
     pub fn time(&self) -> f64 {
-        self.data.time(self.row)
+        match self.data.row_time(self.row) {
+            RowTime::At(time) => time,
+            RowTime::LongAfter => f64::INFINITY,
+        }
     }
 
     /// C, where recorded.
