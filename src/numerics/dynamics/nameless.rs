@@ -5,7 +5,8 @@ use super::choice::CauseChoice;
 use super::findings::plain_finding;
 use super::noise::JointNoise;
 use super::sweep::SweptColumns;
-use super::types::{TorqueFinding, TorqueRival};
+use super::types::TorqueFinding;
+use crate::diagnose::RivalCause;
 use crate::effect::Place;
 use crate::statistics::nearest;
 use std::ops::Range;
@@ -156,7 +157,7 @@ fn without_name(joint: usize, left: f64, over: f64, mut names: Vec<TorqueFinding
     let mut finding = plain_finding(UNKNOWN, place, statement, Vec::new(), left, 1.0);
     for name in names {
         // Names share what the nameless leaves them.
-        let own = TorqueRival { effect: name.effect, place, delta_bic: 0.0, probability: 0.3 * name.probabilities.name };
+        let own = RivalCause { effect: name.effect, place, delta_bic: 0.0, probability: 0.3 * name.probabilities.name };
         finding.rivals.extend(std::iter::once(own).chain(name.rivals));
         finding.evidence.gain = finding.evidence.gain.max(name.evidence.gain);
         finding.evidence.effect_rms = finding.evidence.effect_rms.max(name.evidence.effect_rms);

@@ -1,7 +1,6 @@
 //! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
 
-use super::{Axes, Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Summary, Survey, Term, change, names};
-use crate::robot::RobotModel;
+use super::{Axes, Cause, CauseDescription, Hypothesis, Motion, Summary, Survey, change, names};
 
 pub struct BaseShift;
 
@@ -23,14 +22,6 @@ impl Cause for BaseShift {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         change::propose(&Self, &[Axes::Place, Axes::Both].map(|axes| Motion::Base { axes }), survey)
-    }
-
-    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        term.motion().frame_numbers(|name| name.to_string())
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
-        change::near(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

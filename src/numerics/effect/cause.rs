@@ -140,19 +140,22 @@ pub trait Cause: Sync {
         None
     }
 
-    /// The coefficients of a term of this cause.
-    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        Vec::new()
+    /// The coefficients of a term of this cause; those of a frame's motion unless it says others.
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        term.motion().frame_numbers(str::to_string)
     }
 
-    /// See [`Placed::near`].
-    fn near(&self, _term: &Term, _survey: &Survey, _level: i32) -> Vec<Term> {
-        Vec::new()
+    /// See [`Placed::near`]; laws that step, settle or lag have the same neighbours whatever their cause.
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        match term.basis() {
+            Basis::After { .. } => change::near(term, survey),
+            _ => warmth::near(term, survey, level),
+        }
     }
 
-    /// See [`Placed::variant`].
-    fn variant(&self, _term: &Term) -> String {
-        String::new()
+    /// See [`Placed::variant`]; that of a wave is its order.
+    fn variant(&self, term: &Term) -> String {
+        orders::variant(term)
     }
 
     /// Why a term with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the

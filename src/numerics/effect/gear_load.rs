@@ -1,8 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
-};
+use super::{Cause, CauseDescription, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, names, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -11,13 +9,6 @@ pub struct GearLoad;
 
 /// Orders per joint turn that are tried.
 const ORDERS: u32 = 24;
-
-impl GearLoad {
-    fn term(joint: usize, order: u32) -> Term {
-        let law = orders::wave(Variable::Angle { joint }, order).times(Variable::Load { joint }, Basis::PROPORTIONAL);
-        Term::new(&Self, Motion::Joint { joint }, law)
-    }
-}
 
 impl Cause for GearLoad {
     fn about(&self) -> &'static CauseDescription {
@@ -39,19 +30,12 @@ impl Cause for GearLoad {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let terms = joints.flat_map(|joint| {
-            let orders = orders::within_travel(survey, joint, ORDERS);
-            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(*RARE))
-        });
-        terms.collect()
+        let all = orders::followed(&Self, survey, joints, ORDERS, |joint| Variable::Load { joint });
+        all.into_iter().map(|hypothesis| hypothesis.penalised(*RARE)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         orders::numbers(Unit::RadianPerNewtonMetre, 1e-4)
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

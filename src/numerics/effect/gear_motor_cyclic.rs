@@ -36,10 +36,6 @@ impl Cause for GearMotorCyclic {
         orders::numbers(Unit::Radian, 0.01)
     }
 
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         let amplitude = amplitude(&summary.parameters.iter().collect::<Vec<_>>());
         format!("{} errs periodically with its motor's angle, amplitude {amplitude}", summary.place)

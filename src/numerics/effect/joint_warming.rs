@@ -76,10 +76,6 @@ impl Cause for JointWarming {
         vec![(when.into(), unit, sigma)]
     }
 
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
-    }
-
     fn variant(&self, term: &Term) -> String {
         match term.law().times.map(|factor| factor.of) {
             None => "zero",

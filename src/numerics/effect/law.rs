@@ -71,7 +71,8 @@ impl Factor {
             if let Some(u) = self.of.value(component, robot, state) {
                 let u = self.held(u);
                 // Long after the recording a function without a limit counts for nothing.
-                let mut counted = |k: usize, value: f64| each(component * self.basis.count() + k, if value.is_finite() { value } else { 0.0 });
+                let mut counted =
+                    |k: usize, value: f64| each(component * self.basis.count() + k, if value.is_finite() { value } else { 0.0 });
                 self.basis.at(u, &mut counted);
             }
         }

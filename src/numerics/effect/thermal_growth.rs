@@ -61,10 +61,6 @@ impl Cause for ThermalGrowth {
         }
     }
 
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
-    }
-
     fn impossible(&self, term: &Term, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         let value = *p.first()?;
         let warm_up = matches!(term.basis(), Basis::Settling { .. });

@@ -1,10 +1,9 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
 use super::{
-    Axes, Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, NumberSpec, Place, Summary,
-    Survey, Term, change, holder, names,
+    Axes, Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, Place, Summary, Survey, change,
+    holder, names,
 };
-use crate::robot::RobotModel;
 
 /// A target that moves at some time.
 pub struct ToolShift;
@@ -26,14 +25,6 @@ impl Cause for ToolShift {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         change::propose(&Self, &[Motion::Tool { axes: Axes::Place }], survey)
-    }
-
-    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        term.motion().frame_numbers(|name| name.to_string())
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
-        change::near(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -39,10 +39,6 @@ impl Cause for TrackerCircle {
         orders::numbers(Unit::Radian, 1e-3)
     }
 
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         let orders = orders::in_words(summary, self.name());
         format!("the tracker's azimuths err periodically: {orders}")

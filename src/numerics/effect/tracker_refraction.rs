@@ -52,10 +52,6 @@ impl Cause for TrackerRefraction {
         vec![(if settling { "in_the_end" } else { "per_kelvin" }.into(), Unit::One, 1e-4)]
     }
 
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
-    }
-
     fn impossible(&self, term: &Term, p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         let value = *p.first()?;
         let warm_up = matches!(term.basis(), Basis::Settling { .. });

@@ -33,10 +33,6 @@ impl Cause for ZeroShift {
         vec![("step".into(), term.motion().unit(robot), 0.1)]
     }
 
-    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
-        change::near(term, survey)
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         format!("the zero of {} steps by {}{}", summary.place, summary.size(), summary.when(self.name()))
     }
