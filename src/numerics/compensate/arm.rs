@@ -125,7 +125,7 @@ impl IdentifiedArm {
 
 /// A law that a command takes beyond the rows that it was fitted to.
 pub(super) struct BeyondFitted {
-    /// Of its form, in the stack.
+    /// Parameters of its form, in the stack.
     pub parameters: Range<usize>,
     /// What it is a function of.
     pub variable: Variable,

@@ -73,7 +73,7 @@ pub struct CorrectionOptions {
 }
 
 impl CorrectionOptions {
-    /// Of targets that say all there is, with joints counted so.
+    /// Options for targets that say all there is, with joints counted so.
     pub fn counted_by(convention: JointConvention) -> Self {
         Self {
             convention,
@@ -98,7 +98,7 @@ pub struct Corrector<'a> {
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
-    /// Of the nominal arm, where it has some.
+    /// The sides of the nominal arm, where it has some.
     sides: Option<ArmSides>,
     /// What of the model depends on motor currents.
     by_current: Option<String>,
@@ -120,7 +120,7 @@ pub struct CorrectionTotals {
     pub uncorrected_sum: f64,
     /// m.
     pub uncorrected_max: f64,
-    /// Of those that are reached.
+    /// Largest residual of those that are reached, m.
     pub residual_max: f64,
     /// Targets without a solution.
     pub not_reached: u64,

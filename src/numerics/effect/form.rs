@@ -50,7 +50,7 @@ pub trait Placed: Send + Sync {
     fn near(&self, _survey: &Survey, _level: i32) -> Vec<Form> {
         Vec::new()
     }
-    /// Of forms with one effect, place and variant only one is in a set; others may stand together, e.g. two orders of a gear.
+    /// What tells forms of one effect and place apart that may stand together in a set, e.g. two orders of a gear; of one variant only one does.
     fn variant(&self) -> String {
         String::new()
     }

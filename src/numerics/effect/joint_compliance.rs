@@ -72,7 +72,7 @@ impl Cause for JointCompliance {
     }
 }
 
-/// Of one joint.
+/// The wind-up of one joint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Windup {
     load: Load,
@@ -135,7 +135,7 @@ impl Windup {
     }
 }
 
-/// Of every joint that turns.
+/// The wind-ups of every joint that turns.
 struct Windups(Load);
 
 impl Windups {

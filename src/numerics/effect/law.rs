@@ -10,7 +10,7 @@ const FURTHER: f64 = 0.5;
 /// Functions of one variable; the same whatever the rows that they were fitted to.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
-    /// Of what.
+    /// What they are functions of.
     pub of: Variable,
     /// Which functions of it.
     pub basis: Basis,

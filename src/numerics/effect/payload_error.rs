@@ -54,7 +54,7 @@ impl Cause for PayloadError {
 
     fn sentence(&self, summary: &Summary) -> String {
         match summary.parameters.first() {
-            // Of its forms a tool's mass alone loads an arm without a payload.
+            // A tool's mass is its only form that loads an arm without a payload.
             Some(n) if summary.variables(self.name()).contains(&Variable::ArmLoad) => {
                 let how = if n.value < 0.0 { "less" } else { "more" };
                 format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))

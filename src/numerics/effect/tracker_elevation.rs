@@ -10,7 +10,8 @@ use crate::units::Unit;
 
 pub struct TrackerElevation;
 
-/// Of the elevation, once and twice a turn; of the azimuth, once: a transit axis that is not level turns it by the tangent of the elevation.
+/// What errs, and how often a turn: the elevation once and twice, the azimuth once, which a transit axis that is not level turns by the
+/// tangent of the elevation.
 const WAYS: [(Polar, u32); 3] = [(Polar::Elevation, 1), (Polar::Elevation, 2), (Polar::Azimuth, 1)];
 
 impl Cause for TrackerElevation {

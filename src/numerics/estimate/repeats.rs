@@ -36,7 +36,7 @@ pub struct Repeated {
 impl Poses {
     /// Poses of some rows of a recording.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
-        // Of a moving arm the rows beside one are always near.
+        // The neighbours of a row are always near in a recording of a moving arm.
         let limit = if data.in_motion(rows) { SAME } else { NEAR };
         let poses = grouped(rows, |row| data.q(row), limit, |a, b| data.payload[a] == data.payload[b]);
         let points = poses.iter().flat_map(|rows| points(data, rows)).collect();
@@ -105,7 +105,7 @@ impl Poses {
     }
 }
 
-/// Of the median scatter: five times its standard deviation.
+/// A scatter of so many times the median one is strange: five times its standard deviation.
 const STRANGE: f64 = 25.0;
 /// Joint repeatability between these (rad) is looked for: 0.002 to 2000 arcsec.
 const FINEST: f64 = 1e-8;

@@ -72,7 +72,7 @@ impl MeasurementKind for Planar {
         Some((ResidualNumbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
     }
 
-    /// Of a quotient: d(a / c) = (da - a / c dc) / c.
+    /// The derivative of a quotient: d(a / c) = (da - a / c dc) / c.
     fn sensitivity(&self, _data: &Measurements, _row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
         let point = CAMERA * placed.point;
         let depth = point.z.max(NEAREST);
@@ -115,7 +115,7 @@ impl MeasurementKind for Planar {
         let least = eigen.eigenvalues.imin();
         let camera = eigen.eigenvectors.column(least);
         let turned = Matrix3::from_fn(|i, j| camera[4 * i + j]);
-        // Of a rotation times a scale; the scale has the sign of the determinant.
+        // It is a rotation times a scale, which has the sign of the determinant.
         let scale = libm::cbrt(turned.determinant());
         let svd = (turned / scale).svd(true, true);
         let rotation = svd.u? * svd.v_t?;

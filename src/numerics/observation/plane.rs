@@ -77,7 +77,7 @@ impl MeasurementKind for PlaneKind {
             let scatter: Matrix3<f64> = points.iter().map(|point| (point - place) * (point - place).transpose()).sum();
             let axes = scatter.symmetric_eigen();
             let normal: Vector3<f64> = axes.eigenvectors.column(axes.eigenvalues.imin()).into();
-            // Of the two that are one plane, the normal that points up.
+            // Two normals are one plane: that which points up is taken.
             let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
             Ok(Anchor { name: name.into(), place, shape: Shape::Plane(normal.normalize() * sign) })
         };

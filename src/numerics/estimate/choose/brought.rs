@@ -25,9 +25,9 @@ use rand::{RngExt, SeedableRng};
 pub struct PriorSigma {
     /// E.g. `link_geometry.`.
     pub begins: &'static str,
-    /// Of names that end with a rotation.
+    /// Sigma of parameters whose names end with a rotation.
     pub turns: f64,
-    /// Of all others.
+    /// Sigma of all other parameters.
     pub others: f64,
 }
 
@@ -74,7 +74,7 @@ pub struct BallOffset {
 pub struct BroughtProposal {
     /// The joints at which the ball lies in the sockets; positions are these.
     pub poses: Measurements,
-    /// Of each row, from 0.
+    /// The socket of each row, from 0.
     pub socket: Vec<usize>,
     /// Names and positions of the parameters are its stack's.
     pub model: Model,
@@ -249,7 +249,7 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
     tried.filter_map(one).collect()
 }
 
-/// Of the `count` directions of the geometry that are seen best, the standard deviations (m or rad, ascending), without any prior.
+/// Standard deviations (m or rad, ascending) of the `count` directions of the geometry that are seen best, without any prior.
 fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let specs = model.stack.specs();
     let own = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
