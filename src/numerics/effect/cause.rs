@@ -219,7 +219,7 @@ pub fn cause(name: &str) -> Option<&'static dyn Cause> {
 }
 
 /// The effect of the whole arm of a name, if there is one.
-pub fn whole(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+pub fn arm_effect(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
     cause(name)?.arm_effect(setting)
 }
 

@@ -80,7 +80,7 @@ pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
 pub use basis::{Basis, Gaps};
 pub use cable_drag::CableDrag;
-pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
+pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, arm_effect, cause, hypotheses, identified};
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};

@@ -1,6 +1,6 @@
 //! `tool_offset`: the measured point sits elsewhere on the tool; three parameters a target, base axes at the zero pose.
 //!
-//! Where its orientation is measured too, three more turn a target about its seat.
+//! Where its orientation is measured too, three more turn a target about where it is mounted.
 
 use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
 use crate::robot::{RobotModel, Target};

@@ -5,7 +5,7 @@
 
 use super::fisher::tail;
 use super::model::Model;
-use crate::effect::{EffectContext, EffectStack, Load, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
 use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
 use crate::robot::pose_groups::{NEAR, SAME, STILL, grouped, near};
@@ -195,7 +195,7 @@ impl PoseGroup {
 /// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
 fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
     let setting = EffectContext { base: model.base(), load: Load::GravityTorque };
-    let zeros = whole("joint_offset", &setting);
+    let zeros = arm_effect("joint_offset", &setting);
     let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
     let mut scratch = joints.stack.scratch(&joints.robot);
     let mut columns = vec![Vector3::zeros(); joints.robot.joints()];

@@ -77,8 +77,8 @@ impl MeasurementKind for Distance {
         let mut by_name: BTreeMap<&str, Vec<(Vector3<f64>, f64)>> = BTreeMap::new();
         for row in rows {
             if let Some(reading) = self.reading(data, *row) {
-                let seat = robot.mounting(robot.setup().target(data.target(*row)));
-                let point = (*base * robot.last_body(data.q(*row))).point(&seat.translation);
+                let mounting = robot.mounting_at(data, *row);
+                let point = (*base * robot.last_body(data.q(*row))).point(&mounting.translation);
                 by_name.entry(reading.anchor).or_default().push((point, reading.values[0]));
             }
         }

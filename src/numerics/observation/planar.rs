@@ -88,11 +88,11 @@ impl MeasurementKind for Planar {
 
     /// The camera's pose by the direct linear transform (Hartley and Zisserman, 2004, 7.1): the nominal arm's points against their images.
     fn base(&self, robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<Pose> {
-        let seat = |row: usize| robot.mounting(robot.setup().target(data.target(row)));
         let seen = rows.iter().filter_map(|row| Some((*row, self.reading(data, *row)?)));
         let pairs: Vec<(Vector3<f64>, [f64; 2])> = seen
             .map(|(row, reading)| {
-                ((robot.last_body(data.q(row)) * *seat(row)).translation, [reading.values[0], reading.values[1]])
+                let target = robot.last_body(data.q(row)) * *robot.mounting_at(data, row);
+                (target.translation, [reading.values[0], reading.values[1]])
             })
             .collect();
         if pairs.len() < FEWEST {

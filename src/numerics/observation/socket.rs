@@ -50,8 +50,8 @@ pub(super) fn touches<'a>(
         let known: Vec<&str> = touched.keys().copied().collect();
         for row in (0..data.rows()).filter(|row| fitted[*row] == fit) {
             if let Some(reading) = kind.reading(data, row).filter(|reading| !known.contains(&reading.anchor)) {
-                let seat = robot.mounting(robot.setup().target(data.target(row)));
-                touched.entry(reading.anchor).or_default().push((*base * robot.last_body(data.q(row))).point(&seat.translation));
+                let ball = robot.mounting_at(data, row).translation;
+                touched.entry(reading.anchor).or_default().push((*base * robot.last_body(data.q(row))).point(&ball));
             }
         }
     }

@@ -42,7 +42,7 @@ impl Cause for SeatCompliance {
 mod tests {
     use super::*;
     use crate::fixture;
-    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, whole};
+    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, arm_effect};
     use calib::estimate::{FitOptions, Model, fit};
     use calib::robot::{Measurements, PointReadings};
     use calib::spatial::{Pose, Twist};
@@ -70,7 +70,7 @@ mod tests {
         };
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.1, 2.0));
         let setting = EffectContext { base, load: Load::GravityTorque };
-        let effects: Vec<Box<dyn Effect>> = vec![whole("base_frame", &setting).expect("a cause"), Box::new(form.clone())];
+        let effects: Vec<Box<dyn Effect>> = vec![arm_effect("base_frame", &setting).expect("a cause"), Box::new(form.clone())];
         let start = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
         let mut truth = start.clone();
         let first = truth.x.len() - 3;

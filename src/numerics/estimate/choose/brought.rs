@@ -8,7 +8,7 @@ use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::Site;
 use super::{median, random_sets, subset};
 use crate::criteria::choose::{OFF, POSTURES};
-use crate::effect::{EffectContext, EffectStack, Load, names, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect, names};
 use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
@@ -108,7 +108,8 @@ fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let probe = Measurements { joints: robot.joints(), q: vec![0.0; robot.joints()], ..socketed(vec![0], 1.0) };
     let effects = [names::ANCHOR, names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY, names::JOINT_COMPLIANCE];
-    let made = effects.iter().filter_map(|name| whole(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
+    let made =
+        effects.iter().filter_map(|name| arm_effect(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
     Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, made.collect()))
 }
 
