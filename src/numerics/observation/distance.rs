@@ -21,16 +21,13 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Length,
     axes: 1,
     columns: &[
-        DeclaredColumn::number(
-            "distance",
+        DeclaredColumn::value(
             &["distance"],
             Length,
             [1e-6, 200.0],
             "Distance of the target from an anchor: a draw-wire or ballbar.",
-        )
-        .as_part(Part::Value),
-        DeclaredColumn::number("sigma_distance", &["sigma_distance"], Length, [0.0, 1.0], "Standard deviation of the distance.")
-            .as_part(Part::Sigma),
+        ),
+        DeclaredColumn::sigma(&["sigma_distance"], Length, "Standard deviation of the distance."),
         DeclaredColumn::text("anchor", "Which of several anchors the distance goes to; their places are estimated.")
             .as_part(Part::Anchor),
     ],

@@ -29,32 +29,16 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Angle,
     axes: 2,
     columns: &[
-        DeclaredColumn::number(
-            "image_x",
+        DeclaredColumn::value(
             &["image_x"],
             Number,
             VIEW,
             "Image x of the target over the focal length, to the right, of a camera that is the recording's frame; no unit.",
         )
-        .as_part(Part::Value)
         .together(BOTH),
-        DeclaredColumn::number(
-            "image_y",
-            &["image_y"],
-            Number,
-            VIEW,
-            "Image y of the target over the focal length, downwards; no unit.",
-        )
-        .as_part(Part::Value)
-        .together(BOTH),
-        DeclaredColumn::number(
-            "sigma_image",
-            &["sigma_image"],
-            Number,
-            [0.0, 1.0],
-            "Standard deviation of each of the two; no unit.",
-        )
-        .as_part(Part::Sigma),
+        DeclaredColumn::value(&["image_y"], Number, VIEW, "Image y of the target over the focal length, downwards; no unit.")
+            .together(BOTH),
+        DeclaredColumn::sigma(&["sigma_image"], Number, "Standard deviation of each of the two; no unit."),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [0, 0] },

@@ -23,14 +23,7 @@ static ABOUT: KindDescription = KindDescription {
     columns: &[
         DeclaredColumn::text("plane", "The plane that the target touches: a table, the face of a cube; it is estimated.")
             .as_part(Part::Anchor),
-        DeclaredColumn::number(
-            "sigma_plane",
-            &["sigma_plane"],
-            Length,
-            [0.0, 1.0],
-            "Standard deviation, along its normal, with which a plane is touched.",
-        )
-        .as_part(Part::Sigma),
+        DeclaredColumn::sigma(&["sigma_plane"], Length, "Standard deviation, along its normal, with which a plane is touched."),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },

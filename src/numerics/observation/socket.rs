@@ -20,14 +20,11 @@ static ABOUT: KindDescription = KindDescription {
     columns: &[
         DeclaredColumn::text("socket", "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.")
             .as_part(Part::Anchor),
-        DeclaredColumn::number(
-            "sigma_socket",
+        DeclaredColumn::sigma(
             &["sigma_socket"],
             Length,
-            [0.0, 1.0],
             "Standard deviation per axis with which the ball comes back to a socket.",
-        )
-        .as_part(Part::Sigma),
+        ),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
