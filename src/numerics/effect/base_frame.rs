@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
@@ -41,16 +41,13 @@ impl BasePlacement {
 }
 
 impl Cause for BaseFrame {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::BASE_FRAME,
-            place: "base",
-            formula: "a rigid motion of the base",
-            size: "any",
-            confounded: "tool_offset, joint_offset of the first joint",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::BASE_FRAME,
+        place: "base",
+        formula: "a rigid motion of the base",
+        size: "any",
+        confounded: "tool_offset, joint_offset of the first joint",
+        needs: "-",
     }
 
     fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {

@@ -48,6 +48,17 @@ impl CauseDescription {
     };
 }
 
+/// Writes what a cause is, [`Cause::about`](crate::effect::Cause::about): `about! { name: "backlash", place: "joint" }`. What it does not say is
+/// as of most causes, [`CauseDescription::PLAIN`](crate::effect::CauseDescription::PLAIN).
+#[macro_export]
+macro_rules! about {
+    ($($field:ident: $value:expr),+ $(,)?) => {
+        fn about(&self) -> &'static $crate::effect::CauseDescription {
+            &$crate::effect::CauseDescription { $($field: $value,)+ ..$crate::effect::CauseDescription::PLAIN }
+        }
+    };
+}
+
 /// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measure {

@@ -1,6 +1,6 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
-use super::{Cause, CauseDescription, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, names, orders};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -10,19 +10,16 @@ pub struct GearFlank;
 const ORDERS: u32 = 24;
 
 impl Cause for GearFlank {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "gear_flank",
-            place: "joint",
-            formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",
-            size: "2 to 40 arcsec",
-            confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
-            needs: "both directions of approach over the joint's range",
-            measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
-            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-            prior_sigma: Some(orders::LARGE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "gear_flank",
+        place: "joint",
+        formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",
+        size: "2 to 40 arcsec",
+        confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
+        needs: "both directions of approach over the joint's range",
+        measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
+        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -1,6 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{Cause, CauseDescription, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, names, orders};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -11,21 +11,18 @@ pub struct GearLoad;
 const ORDERS: u32 = 24;
 
 impl Cause for GearLoad {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "gear_load",
-            place: "joint",
-            formula: "d = t (a sin(n q) + b cos(n q)), n = 1 .. 24",
-            size: "2 to 40 arcsec under full load",
-            confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
-            needs: "link masses, loads that change at the same angle",
-            measure: Some(Measure {
-                rank: 5,
-                advice: "repeat poses with and without a payload over the whole range of the joint",
-            }),
-            absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "gear_load",
+        place: "joint",
+        formula: "d = t (a sin(n q) + b cos(n q)), n = 1 .. 24",
+        size: "2 to 40 arcsec under full load",
+        confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
+        needs: "link masses, loads that change at the same angle",
+        measure: Some(Measure {
+            rank: 5,
+            advice: "repeat poses with and without a payload over the whole range of the joint",
+        }),
+        absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -6,8 +6,8 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
-    Place, Placed, Summary, Survey, Variable, names,
+    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec, Place, Placed,
+    Summary, Survey, Variable, about, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -16,17 +16,14 @@ use serde::{Deserialize, Serialize};
 pub struct JointCompliance;
 
 impl Cause for JointCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_COMPLIANCE,
-            place: "joint",
-            formula: "d = c t",
-            size: "0.1 to 10 urad/Nm",
-            confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
-            needs: "link masses, motor currents, or many postures",
-            absorbs_residual: &[names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_COMPLIANCE,
+        place: "joint",
+        formula: "d = c t",
+        size: "0.1 to 10 urad/Nm",
+        confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
+        needs: "link masses, motor currents, or many postures",
+        absorbs_residual: &[names::UNKNOWN],
     }
 
     fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {

@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
-    Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place, Placed, Summary,
+    Survey, Variable, about, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -51,21 +51,18 @@ const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
 
 impl Cause for JointHardening {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_HARDENING,
-            place: "joint",
-            formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
-            size: "5 to 50 % of the wind-up",
-            confounded: "joint_compliance, backlash",
-            needs: "link masses and two payloads",
-            measure: Some(Measure {
-                rank: 7,
-                advice: "measure with a third payload between none and full, and with joints near their largest load",
-            }),
-            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_HARDENING,
+        place: "joint",
+        formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
+        size: "5 to 50 % of the wind-up",
+        confounded: "joint_compliance, backlash",
+        needs: "link masses and two payloads",
+        measure: Some(Measure {
+            rank: 7,
+            advice: "measure with a third payload between none and full, and with joints near their largest load",
+        }),
+        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
     }
 
     /// Every loaded joint with several laws each.

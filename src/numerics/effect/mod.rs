@@ -74,6 +74,7 @@ mod words;
 mod wrong_point;
 mod zero_shift;
 
+pub use crate::about;
 pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;

@@ -3,8 +3,7 @@
 use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
-    figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -27,17 +26,14 @@ pub struct WrongPayload {
 const TOOL: f64 = 5.0;
 
 impl Cause for PayloadError {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::PAYLOAD_ERROR,
-            place: "tool",
-            formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
-            size: "3 to 30 %",
-            confounded: "joint_hardening",
-            needs: "rows with and without the payload",
-            measure: Some(MEASURE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::PAYLOAD_ERROR,
+        place: "tool",
+        formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
+        size: "3 to 30 %",
+        confounded: "joint_hardening",
+        needs: "rows with and without the payload",
+        measure: Some(MEASURE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about where it is mounted.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -27,16 +27,13 @@ impl ToolOffset {
 }
 
 impl Cause for ToolOffset {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::TOOL_OFFSET,
-            place: "tool",
-            formula: "a displacement of the measured point",
-            size: "any",
-            confounded: "link_geometry of the last link",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::TOOL_OFFSET,
+        place: "tool",
+        formula: "a displacement of the measured point",
+        size: "any",
+        confounded: "link_geometry of the last link",
+        needs: "-",
     }
 
     fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {

@@ -1,4 +1,4 @@
-use calib::effect::{Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use calib::effect::{Axes, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about};
 use calib::robot::RobotModel;
 use calib::units::Unit;
 
@@ -6,16 +6,13 @@ use calib::units::Unit;
 pub struct SeatCompliance;
 
 impl Cause for SeatCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "seat_compliance",
-            place: "tool",
-            formula: "the target moves by c times the payload over the largest payload",
-            size: "10 to 200 um",
-            confounded: "payload_error, joint_compliance of the last joints",
-            needs: "rows with and without the payload",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "seat_compliance",
+        place: "tool",
+        formula: "the target moves by c times the payload over the largest payload",
+        size: "10 to 200 um",
+        confounded: "payload_error, joint_compliance of the last joints",
+        needs: "rows with and without the payload",
     }
 
     /// One hypothesis, where the recording can tell.

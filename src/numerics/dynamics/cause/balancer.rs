@@ -1,7 +1,7 @@
 //! A balancer at the joint that arms balance: its torque swings with the joint's angle.
 
 use super::spring::{BALANCED, SPRING_BALANCE_NAME};
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Shape: least and greatest angle of the joint, rad. Between two points a spring's lever is a sine of the angle: one wave a turn; where its force grows with its stroke (gas, a bent lever)
@@ -20,13 +20,10 @@ fn waves(q: f64) -> [f64; 5] {
 }
 
 impl TorqueCause for Balancer {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: SPRING_BALANCE_NAME,
-            coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")],
-            of_angle: true,
-            ..PLAIN
-        }
+    about! {
+        name: SPRING_BALANCE_NAME,
+        coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")],
+        of_angle: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

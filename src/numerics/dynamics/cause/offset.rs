@@ -1,8 +1,6 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{
-    FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, at_each_joint_with, fill,
-};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -20,9 +18,7 @@ const USUAL: f64 = 15.0;
 const LONGEST: f64 = 0.45;
 
 impl TorqueCause for Offset {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true, ..PLAIN }
-    }
+    about! { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let longest = LONGEST * scene.duration();

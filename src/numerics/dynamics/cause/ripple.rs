@@ -1,6 +1,6 @@
 //! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill, shape};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -21,14 +21,11 @@ impl Ripple {
 }
 
 impl TorqueCause for Ripple {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "torque_ripple",
-            coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
-            may_repeat: true,
-            of_angle: true,
-            ..PLAIN
-        }
+    about! {
+        name: "torque_ripple",
+        coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
+        may_repeat: true,
+        of_angle: true,
     }
 
     /// As common as other causes, over all orders together.

@@ -1,6 +1,6 @@
 //! Friction that is greater at low speed and falls as the joint gets faster.
 
-use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, fill};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// sgn v exp(-|v| / vs) (Armstrong-Helouvry, 1994).
@@ -16,15 +16,12 @@ const SPEEDS: [&[f64]; 8] =
 const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
 impl TorqueCause for Stribeck {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "stribeck_friction",
-            coefficients: &[("stribeck", "Nm")],
-            of_sign: true,
-            modifies: &[COULOMB],
-            positive: true,
-            ..PLAIN
-        }
+    about! {
+        name: "stribeck_friction",
+        coefficients: &[("stribeck", "Nm")],
+        of_sign: true,
+        modifies: &[COULOMB],
+        positive: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! A current that makes another torque than declared.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
@@ -15,14 +15,11 @@ const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 const MOST: f64 = 0.6;
 
 impl TorqueCause for TorqueConstant {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "torque_constant",
-            coefficients: &[("relative", "1")],
-            inertial: true,
-            of_rigid: true,
-            ..PLAIN
-        }
+    about! {
+        name: "torque_constant",
+        coefficients: &[("relative", "1")],
+        inertial: true,
+        of_rigid: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
