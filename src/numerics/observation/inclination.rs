@@ -3,7 +3,7 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;

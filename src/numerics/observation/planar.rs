@@ -3,7 +3,7 @@
 //! u = -y / x to the right, v = -z / x downwards: the frame's x axis is the optical axis, z is up. They are pixels from the principal point
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
