@@ -13,9 +13,9 @@ use std::ops::Range;
 
 /// Standard deviations of the mean square of noise.
 const DEVIATIONS: f64 = 3.0;
-/// Of fitted and of held-out rows over the noise, above which something is left at a joint.
+/// Residual over the noise, of fitted and of held-out rows, above which something is left at a joint.
 const LEFT: f64 = 1.2;
-/// Of two torques: both together are less than this share of either.
+/// Two torques cancel that are together less than this share of either.
 const CANCELLED: f64 = 0.5;
 /// Standard deviations from which on something is shown.
 const SHOWN: f64 = 2.0;

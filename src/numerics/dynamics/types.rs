@@ -16,7 +16,7 @@ pub struct TorqueQuestion {
     pub without: Vec<String>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,
-    /// Of the bootstrap.
+    /// Seed of the bootstrap.
     pub seed: u64,
 }
 
@@ -81,7 +81,7 @@ pub struct TorqueFinding {
     pub evidence: Evidence,
     /// Explanations that these data do not exclude, the closest first.
     pub rivals: Vec<RivalCause>,
-    /// Of its name and its place.
+    /// How probable its name and its place are.
     pub probabilities: Probabilities,
 }
 
@@ -192,7 +192,7 @@ pub struct TorqueDiagnosis {
     pub rate: f64,
     /// Per joint.
     pub noise: Vec<TorqueNoise>,
-    /// Of held-out rows (of the fitted ones where none are held out), of the arm as declared (with identified masses alone where nothing is
+    /// Errors of held-out rows (of the fitted ones where none are held out), of the arm as declared (with identified masses alone where nothing is
     /// declared).
     pub before: TorqueErrors,
     /// The same with the findings.
@@ -213,7 +213,7 @@ pub struct TorqueDiagnosis {
     pub courses: TorqueCourses,
     /// Ten a link.
     pub inertials: Vec<InertialEstimate>,
-    /// Of joints with friction found.
+    /// Curves of joints with friction found.
     pub friction: Vec<FrictionCurve>,
     /// All that was identified, as torques are predicted with it.
     pub model: TorqueModel,

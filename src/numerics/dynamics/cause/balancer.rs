@@ -14,7 +14,7 @@ const WIDTHS: [usize; 2] = [2, 5];
 const CHECKED: usize = 8;
 const LEAST_WHOLE: f64 = 0.4;
 
-/// Of an angle, column by column.
+/// The waves of an angle, column by column.
 fn waves(q: f64) -> [f64; 5] {
     [q.cos(), q.sin(), (2.0 * q).cos(), (2.0 * q).sin(), 1.0]
 }

@@ -10,7 +10,7 @@ use crate::dynamics::types::TorqueParameter;
 pub(super) struct HeavierLink;
 
 const WIDTH: usize = 1;
-/// Of the declared mass: more is no error of a declaration.
+/// Share of the declared mass: what errs by more is no error of a declaration.
 const LEAST: f64 = -0.7;
 const MOST: f64 = 1.0;
 

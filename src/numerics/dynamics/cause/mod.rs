@@ -227,7 +227,7 @@ pub(super) struct TorqueForm {
 }
 
 impl TorqueForm {
-    /// Of a joint, without shape numbers.
+    /// A form at a joint, without shape numbers.
     pub fn at_joint(cause: &'static dyn TorqueCause, joint: usize, width: usize) -> Self {
         Self { cause, place: Place::Joint(joint), with: [0; 2], shape: Vec::new(), width }
     }

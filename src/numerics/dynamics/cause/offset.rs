@@ -14,7 +14,7 @@ pub(super) struct Offset;
 const TIMES: [f64; 3] = [5.0, USUAL, 45.0];
 /// s, of the form that stands in the rich model.
 const USUAL: f64 = 15.0;
-/// Of the recording: a zero that moves for longer is one that stays.
+/// Share of the recording: a zero that moves for longer is one that stays.
 const LONGEST: f64 = 0.45;
 
 impl TorqueCause for Offset {

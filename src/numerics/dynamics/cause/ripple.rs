@@ -77,7 +77,7 @@ impl TorqueCause for Ripple {
     }
 }
 
-/// Of a cosine and a sine, with its standard deviation.
+/// The amplitude of a cosine and a sine, with its standard deviation.
 fn amplitude(fitted: &[FittedNumber]) -> (f64, f64) {
     let amplitude = fitted[0].value.hypot(fitted[1].value);
     let weighted = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma);

@@ -7,7 +7,7 @@ use crate::dynamics::scene::DynamicScene;
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) struct TorqueConstant;
 
-/// Of the largest torque.
+/// Shares of the largest torque.
 const HALVES: [f64; 2] = [0.25, 1.0];
 const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 

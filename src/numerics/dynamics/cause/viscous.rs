@@ -52,7 +52,7 @@ fn exponent(form: &TorqueForm) -> Option<f64> {
     form.shape.first().copied().filter(|exponent| *exponent != 1.0)
 }
 
-/// Of a velocity, with its sign.
+/// The power of a velocity, with its sign.
 fn power(form: &TorqueForm, velocity: f64) -> f64 {
     exponent(form).map_or(velocity, |exponent| velocity.signum() * velocity.abs().powf(exponent))
 }

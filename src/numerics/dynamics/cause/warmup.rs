@@ -8,7 +8,7 @@ pub(super) struct Warmup;
 
 /// s.
 const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];
-/// Of the recording: what lasts longer is friction that stays.
+/// Share of the recording: what lasts longer is friction that stays.
 const LONGEST: f64 = 0.45;
 /// s, the longest that stands in the rich model.
 const USUAL: f64 = 18.0;
