@@ -3,7 +3,7 @@
 //! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
 //! centre and `radius`.
 
-use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::{Anchor, RobotModel, Shape};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -36,10 +36,7 @@ impl Cause for AnchorShift {
         size: "any",
         confounded: "base_frame",
         needs: "distances, sockets, planes or spheres",
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+        arm_effect: Some(|_| Box::new(AnchorShift)),
     }
 }
 

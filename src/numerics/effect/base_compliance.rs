@@ -32,6 +32,7 @@ impl Cause for BaseCompliance {
         size: "0.01 to 1 urad/Nm",
         confounded: "joint_compliance of joint 2, link_compliance of link 1",
         needs: "link masses",
+        read: Some(Form::kept::<TiltingBase>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -42,10 +43,6 @@ impl Cause for BaseCompliance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the base tilts under the arm's weight by {}", summary.value())
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(TiltingBase::deserialize(body).map(Form::from))
     }
 }
 

@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
@@ -48,10 +48,7 @@ impl Cause for BaseFrame {
         size: "any",
         confounded: "tool_offset, joint_offset of the first joint",
         needs: "-",
-    }
-
-    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(BasePlacement { start: setting.base }))
+        arm_effect: Some(|setting| Box::new(BasePlacement { start: setting.base })),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, Form, Hypothesis, Summary, Survey, about, names};
+use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
@@ -18,6 +18,7 @@ impl Cause for CableDrag {
         needs: "motor currents",
         measure: Some(MEASURE),
         absorbs_residual: FINER,
+        read: Some(|body| Spring::read(&CableDrag, body)),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -32,9 +33,5 @@ impl Cause for CableDrag {
                 "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
             ),
         }
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Spring::read(&Self, body))
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::criteria::words::REFINEMENT;
 
 /// What a cause is: in words, and in what diagnosis asks of every cause.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct CauseDescription {
     /// Canonical name.
     pub name: &'static str,
@@ -29,6 +29,10 @@ pub struct CauseDescription {
     pub absorbs_residual: &'static [&'static str],
     /// What separates it from others beside more poses.
     pub measure: Option<Measure>,
+    /// The effect of the whole arm, for causes that are identified, not searched for.
+    pub arm_effect: Option<fn(&EffectContext) -> Box<dyn Effect>>,
+    /// Reads its forms, where they are no [`Term`], as [`Placed::body`] wrote them.
+    pub read: Option<fn(&serde_json::Value) -> serde_json::Result<Form>>,
 }
 
 impl CauseDescription {
@@ -45,6 +49,8 @@ impl CauseDescription {
         prior_sigma: None,
         absorbs_residual: &[],
         measure: None,
+        arm_effect: None,
+        read: None,
     };
 }
 
@@ -81,9 +87,9 @@ pub trait Cause: Sync {
         self.about().name
     }
 
-    /// The effect of the whole arm, for causes that are identified, not searched for.
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        None
+    /// See [`CauseDescription::arm_effect`].
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+        self.about().arm_effect.map(|make| make(setting))
     }
 
     /// Every hypothesis that the recording can speak of.
@@ -144,11 +150,6 @@ pub trait Cause: Sync {
     /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
     fn identities(&self, _term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
-    }
-
-    /// Reads a form that is no [`Term`], as [`Placed::body`] wrote it.
-    fn read(&self, _body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        None
     }
 
     /// The coefficients of a term of this cause; those of a frame's motion unless it says others.

@@ -3,7 +3,7 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, Form, Hypothesis, Summary, Survey, about, names};
+use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
 pub struct Counterbalance;
 
@@ -17,6 +17,7 @@ impl Cause for Counterbalance {
         needs: "link masses and motor currents",
         measure: Some(MEASURE),
         absorbs_residual: FINER,
+        read: Some(|body| Spring::read(&Counterbalance, body)),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -25,9 +26,5 @@ impl Cause for Counterbalance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Spring::read(&Self, body))
     }
 }

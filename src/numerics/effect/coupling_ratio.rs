@@ -3,8 +3,8 @@
 //! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
 use super::{
-    ArmState, Cause, Deflection, Effect, EffectContext, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Summary,
-    Survey, Term, Variable, about, figure, names,
+    ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Summary, Survey, Term,
+    Variable, about, figure, names,
 };
 use crate::criteria::effect::RARER;
 use crate::robot::{Measurements, RobotModel};
@@ -20,10 +20,7 @@ impl Cause for CouplingRatio {
         size: "1e-5 to 1e-2",
         confounded: "axis_wobble, link_geometry",
         needs: "a wide travel of joint A",
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(DeclaredCouplings))
+        arm_effect: Some(|_| Box::new(DeclaredCouplings)),
     }
 
     /// Every pair that the robot file does not declare.

@@ -6,8 +6,8 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec, Place, Placed,
-    Summary, Survey, Variable, about, names,
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, NumberSpec, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, about, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -24,10 +24,8 @@ impl Cause for JointCompliance {
         confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
         needs: "link masses, motor currents, or many postures",
         absorbs_residual: &[names::UNKNOWN],
-    }
-
-    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Windups(setting.load)))
+        arm_effect: Some(|setting| Box::new(Windups(setting.load))),
+        read: Some(|body| UnweighedWindup::read(&JointCompliance, body).unwrap_or_else(|| Form::kept::<Windup>(body))),
     }
 
     /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
@@ -58,10 +56,6 @@ impl Cause for JointCompliance {
                  not give"
             ),
         }
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        UnweighedWindup::read(&Self, body).or_else(|| Some(Windup::deserialize(body).map(Form::from)))
     }
 
     fn yields_to_torque(&self) -> bool {

@@ -63,6 +63,7 @@ impl Cause for JointHardening {
             advice: "measure with a third payload between none and full, and with joints near their largest load",
         }),
         absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+        read: Some(Form::kept::<BentWindup>),
     }
 
     /// Every loaded joint with several laws each.
@@ -97,11 +98,6 @@ impl Cause for JointHardening {
 
     fn simpler(&self) -> Option<&'static str> {
         Some(names::JOINT_COMPLIANCE)
-    }
-
-    /// From a wind-up in proportion.
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(BentWindup::deserialize(body).map(Form::from))
     }
 
     fn yields_to_torque(&self) -> bool {

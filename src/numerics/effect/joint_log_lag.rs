@@ -48,6 +48,7 @@ impl Cause for JointLogLag {
         needs: "rows in the order of measurement; joint velocities",
         of_the_measurement: true,
         separable_by_poses: false,
+        read: Some(Form::kept::<Lag>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -101,10 +102,6 @@ impl Cause for JointLogLag {
     fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
         let clocks = form.variables() == [Variable::Speed];
         clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Lag::deserialize(body).map(Form::from))
     }
 }
 

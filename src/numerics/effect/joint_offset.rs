@@ -1,6 +1,6 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -15,10 +15,7 @@ impl Cause for JointOffset {
         size: "0.1 to 5 mrad",
         confounded: "base_frame, link_geometry",
         needs: "-",
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+        arm_effect: Some(|_| Box::new(JointOffset)),
     }
 }
 

@@ -43,6 +43,7 @@ impl Cause for LinkCompliance {
         size: "0.05 to 1 urad/Nm",
         confounded: "joint_compliance of either end",
         needs: "link masses",
+        read: Some(Form::kept::<BentLink>),
     }
 
     /// Every link that something hangs on.
@@ -65,10 +66,6 @@ impl Cause for LinkCompliance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} bends under what it carries by {}", summary.place, summary.value())
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(BentLink::deserialize(body).map(Form::from))
     }
 }
 

@@ -28,6 +28,7 @@ impl Cause for LinkMass {
         confounded: "counterbalance, payload_error",
         needs: "link masses and motor currents",
         measure: Some(MEASURE),
+        read: Some(Form::kept::<WrongLinkMass>),
     }
 
     /// Every link carried by a joint that yields in the present model.
@@ -42,10 +43,6 @@ impl Cause for LinkMass {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(WrongLinkMass::deserialize(body).map(Form::from))
     }
 }
 

@@ -34,6 +34,7 @@ impl Cause for PayloadError {
         confounded: "joint_hardening",
         needs: "rows with and without the payload",
         measure: Some(MEASURE),
+        read: Some(Form::kept::<WrongPayload>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -61,10 +62,6 @@ impl Cause for PayloadError {
             }
             None => "the payload is not what was declared".to_string(),
         }
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(WrongPayload::deserialize(body).map(Form::from))
     }
 }
 

@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -19,10 +19,7 @@ impl Cause for ReductionRatio {
         size: "1e-5 to 1e-3",
         confounded: "joint_compliance, gear_cyclic of order 1",
         needs: "a wide travel of the joint",
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+        arm_effect: Some(|_| Box::new(ReductionRatio)),
     }
 }
 

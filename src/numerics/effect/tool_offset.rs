@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about where it is mounted.
 
-use super::{ArmState, Cause, Deflection, Effect, EffectContext, ParameterSpec, Place, about, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -34,10 +34,7 @@ impl Cause for ToolOffset {
         size: "any",
         confounded: "link_geometry of the last link",
         needs: "-",
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+        arm_effect: Some(|_| Box::new(ToolOffset)),
     }
 }
 
