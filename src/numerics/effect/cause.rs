@@ -30,7 +30,7 @@ pub struct CauseDescription {
     /// What separates it from others beside more poses.
     pub measure: Option<Measure>,
     /// The effect of the whole arm, for causes that are identified, not searched for.
-    pub arm_effect: Option<fn(&EffectContext) -> Box<dyn Effect>>,
+    pub arm_effect: Option<ArmEffectOf>,
     /// Reads its forms, where they are no [`Term`], as [`Placed::body`] wrote them.
     pub read: Option<fn(&serde_json::Value) -> serde_json::Result<Form>>,
 }
@@ -64,6 +64,9 @@ macro_rules! about {
         }
     };
 }
+
+/// The effect of the whole arm in a setting.
+pub type ArmEffectOf = fn(&EffectContext) -> Box<dyn Effect>;
 
 /// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
