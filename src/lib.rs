@@ -80,7 +80,7 @@
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |
-//! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
+//! | export format | `src/export/<name>.rs`, which declares an [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
 //! An effect step by step, with a file that a test compiles and fits: `src/numerics/effect/README.md`.

@@ -1,7 +1,7 @@
 //! What most controllers let one enter, as a list: zeros, ratios, couplings, the tool.
 
 use super::deviation::{DeviationEntry, JointDeviation};
-use super::{Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::error::Result;
 use crate::estimate::Covariance;
 use crate::identified::IdentifiedModel;
@@ -9,30 +9,24 @@ use crate::robot::{JointConvention, RobotModel};
 use crate::units::Unit;
 use std::collections::BTreeSet;
 
-pub(super) struct Controller;
+pub(super) const CONTROLLER: Format = Format {
+    name: "controller",
+    help: "Joint zeros, ratios, couplings and tool, as a list, as the controller counts its joints",
+    carries: CarriedTorques::Nothing,
+    text,
+};
 
-impl Format for Controller {
-    fn name(&self) -> &'static str {
-        "controller"
+fn text(export: &Export) -> Result<String> {
+    let mut text: String = export.remarks().iter().map(|line| format!("# {line}\n")).collect();
+    text.push_str(
+        "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
+    );
+    text.push_str("quantity,where,value,unit,sigma,status\n");
+    text.extend(lines(&export.identified));
+    for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(export.corrected.tool.iter().zip(&export.identified.robot.tool)) {
+        text.push_str(&format!("tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n", now * 1e3, nominal * 1e3));
     }
-
-    fn help(&self) -> &'static str {
-        "Joint zeros, ratios, couplings and tool, as a list, as the controller counts its joints"
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        let mut text: String = export.remarks().iter().map(|line| format!("# {line}\n")).collect();
-        text.push_str(
-            "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
-        );
-        text.push_str("quantity,where,value,unit,sigma,status\n");
-        text.extend(lines(&export.identified));
-        for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(export.corrected.tool.iter().zip(&export.identified.robot.tool))
-        {
-            text.push_str(&format!("tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n", now * 1e3, nominal * 1e3));
-        }
-        Ok(text)
-    }
+    Ok(text)
 }
 
 /// A parameter, and what the numbers of the list are by it. SI.

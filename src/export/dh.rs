@@ -1,6 +1,6 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
-use super::{Export, Format};
+use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
 use crate::error::{Error, Result, one_line};
 use crate::estimate::choose::spread;
@@ -18,36 +18,15 @@ const FARTHEST: f64 = 100.0;
 /// Poses at which the table that is read back is compared with the geometry.
 const POSES: usize = 500;
 
-pub(super) struct Dh;
-pub(super) struct Mdh;
+pub(super) const DH: Format = Format {
+    name: "dh",
+    help: "calib's robot file with a Denavit-Hartenberg table",
+    carries: CarriedTorques::Nothing,
+    text: |export| text(export, false),
+};
 
-impl Format for Dh {
-    fn name(&self) -> &'static str {
-        "dh"
-    }
-
-    fn help(&self) -> &'static str {
-        "calib's robot file with a Denavit-Hartenberg table"
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        text(export, false)
-    }
-}
-
-impl Format for Mdh {
-    fn name(&self) -> &'static str {
-        "mdh"
-    }
-
-    fn help(&self) -> &'static str {
-        "The same with Craig's modified table"
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        text(export, true)
-    }
-}
+pub(super) const MDH: Format =
+    Format { name: "mdh", help: "The same with Craig's modified table", text: |export| text(export, true), ..DH };
 
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {

@@ -8,29 +8,20 @@ use crate::identified::IdentifiedTorques;
 use crate::table::TorqueParameterRow;
 use serde_json::{Map, Value, json};
 
-pub(super) struct Dynamics;
+pub(super) const DYNAMICS: Format = Format {
+    name: "dynamics",
+    help: "Friction, inertials and all other causes of the torques with sigma, as plain JSON",
+    carries: CarriedTorques::All,
+    text,
+};
 
-impl Format for Dynamics {
-    fn name(&self) -> &'static str {
-        "dynamics"
-    }
-
-    fn help(&self) -> &'static str {
-        "Friction, inertials and all other causes of the torques with sigma, as plain JSON"
-    }
-
-    fn carries(&self) -> CarriedTorques {
-        CarriedTorques::All
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        let Some(torques) = &export.identified.torques else {
-            let message = "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
-            return Err(Error::spec("--format dynamics", message));
-        };
-        let document = document(export, torques);
-        serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
-    }
+fn text(export: &Export) -> Result<String> {
+    let Some(torques) = &export.identified.torques else {
+        let message = "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
+        return Err(Error::spec("--format dynamics", message));
+    };
+    let document = document(export, torques);
+    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
 }
 
 /// The model of torques as one document.

@@ -12,44 +12,35 @@ use std::io;
 /// Mass, kg, and inertia, kg m2, that no body has less of: MuJoCo refuses moving bodies without.
 const LEAST: [(&str, &str); 2] = [("boundmass", "0.001"), ("boundinertia", "1e-6")];
 
-pub(super) struct Mjcf;
+pub(super) const MJCF: Format = Format {
+    name: "mjcf",
+    help: "MuJoCo model: bodies and joints at the corrected axes, the tool as a site",
+    carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE]),
+    text,
+};
 
-impl Format for Mjcf {
-    fn name(&self) -> &'static str {
-        "mjcf"
+fn text(export: &Export) -> Result<String> {
+    let robot = &export.corrected;
+    let mut remarks = export.remarks_in(MJCF.carries);
+    if !robot.couplings.is_empty() {
+        remarks.push("couplings of joints are not part of it: they stand in the original robot file".into());
     }
-
-    fn help(&self) -> &'static str {
-        "MuJoCo model: bodies and joints at the corrected axes, the tool as a site"
+    if (0..robot.joints.len()).any(|joint| export.body(joint).is_none()) {
+        remarks.push(format!("bodies whose mass is not known have {} kg", LEAST[0].1));
     }
-
-    fn carries(&self) -> CarriedTorques {
-        CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE])
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        let robot = &export.corrected;
-        let mut remarks = export.remarks_in(self.carries());
-        if !robot.couplings.is_empty() {
-            remarks.push("couplings of joints are not part of it: they stand in the original robot file".into());
-        }
-        if (0..robot.joints.len()).any(|joint| export.body(joint).is_none()) {
-            remarks.push(format!("bodies whose mass is not known have {} kg", LEAST[0].1));
-        }
-        let name = one_line(&robot.name);
-        xml::document(&remarks, |xml| {
-            xml.create_element("mujoco").with_attribute(("model", name.as_str())).write_inner_content(|xml| {
-                empty(xml, "compiler", &[&[("angle", "radian")][..], &LEAST].concat())?;
-                empty(xml, "option", &[("gravity", &numbers(robot.gravity))])?;
-                xml.create_element("worldbody").write_inner_content(|xml| {
-                    let base = xml.create_element("body").with_attribute(("name", "base_link"));
-                    base.write_inner_content(|xml| beyond(xml, export, 0)).map(drop)
-                })?;
-                drives(xml, export)
+    let name = one_line(&robot.name);
+    xml::document(&remarks, |xml| {
+        xml.create_element("mujoco").with_attribute(("model", name.as_str())).write_inner_content(|xml| {
+            empty(xml, "compiler", &[&[("angle", "radian")][..], &LEAST].concat())?;
+            empty(xml, "option", &[("gravity", &numbers(robot.gravity))])?;
+            xml.create_element("worldbody").write_inner_content(|xml| {
+                let base = xml.create_element("body").with_attribute(("name", "base_link"));
+                base.write_inner_content(|xml| beyond(xml, export, 0)).map(drop)
             })?;
-            Ok(())
-        })
-    }
+            drives(xml, export)
+        })?;
+        Ok(())
+    })
 }
 
 /// What hangs on the body before joint `index` (from 0): the next body with all behind it, at last the tool.

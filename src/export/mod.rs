@@ -17,17 +17,15 @@ pub use model::Export;
 use crate::error::Result;
 
 /// A way to write the model down.
-pub trait Format: Sync {
+pub struct Format {
     /// What `--format` calls it.
-    fn name(&self) -> &'static str;
+    pub name: &'static str,
     /// What it is, in one line.
-    fn help(&self) -> &'static str;
-    /// The whole file. Fails where the format cannot hold this arm at all.
-    fn text(&self, export: &Export) -> Result<String>;
+    pub help: &'static str,
     /// What it holds of identified torques.
-    fn carries(&self) -> CarriedTorques {
-        CarriedTorques::Nothing
-    }
+    pub carries: CarriedTorques,
+    /// The whole file. Fails where the format cannot hold this arm at all.
+    pub text: fn(&Export) -> Result<String>,
 }
 
 /// What a format holds of identified torques.
@@ -42,5 +40,4 @@ pub enum CarriedTorques {
 }
 
 /// All formats, in the order of the help.
-pub const FORMATS: &[&dyn Format] =
-    &[&urdf::Urdf, &dh::Dh, &dh::Mdh, &json::Json, &mjcf::Mjcf, &controller::Controller, &dynamics::Dynamics];
+pub const FORMATS: &[Format] = &[urdf::URDF, dh::DH, dh::MDH, json::JSON, mjcf::MJCF, controller::CONTROLLER, dynamics::DYNAMICS];

@@ -8,29 +8,20 @@ use crate::error::{Result, one_line};
 use nalgebra::{Matrix3, Rotation3};
 use std::io;
 
-pub(super) struct Urdf;
+pub(super) const URDF: Format = Format {
+    name: "urdf",
+    help: "Unified robot description: joints at the corrected axes",
+    carries: CarriedTorques::Causes(&[DAMPING, FRICTION]),
+    text,
+};
 
-impl Format for Urdf {
-    fn name(&self) -> &'static str {
-        "urdf"
-    }
-
-    fn help(&self) -> &'static str {
-        "Unified robot description: joints at the corrected axes"
-    }
-
-    fn carries(&self) -> CarriedTorques {
-        CarriedTorques::Causes(&[DAMPING, FRICTION])
-    }
-
-    fn text(&self, export: &Export) -> Result<String> {
-        let remarks = export.remarks_in(self.carries());
-        xml::document(&remarks, |xml| {
-            let name = one_line(&export.corrected.name);
-            xml.create_element("robot").with_attribute(("name", name.as_str())).write_inner_content(|xml| robot(xml, export))?;
-            Ok(())
-        })
-    }
+fn text(export: &Export) -> Result<String> {
+    let remarks = export.remarks_in(URDF.carries);
+    xml::document(&remarks, |xml| {
+        let name = one_line(&export.corrected.name);
+        xml.create_element("robot").with_attribute(("name", name.as_str())).write_inner_content(|xml| robot(xml, export))?;
+        Ok(())
+    })
 }
 
 fn robot(xml: &mut Xml, export: &Export) -> io::Result<()> {

@@ -4,6 +4,7 @@ use super::file::{FleetFile, RobotSource, faulty};
 use super::robot::FleetRobot;
 use super::{list, partition};
 use crate::error::{Error, Result};
+use crate::stage::matches;
 use crate::store::Store;
 use crate::yaml::{Node, Trouble};
 use std::collections::BTreeMap;
@@ -118,26 +119,4 @@ fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobo
     }
     robots.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(robots)
-}
-
-/// Whether a name is like a pattern in which `*` stands for anything.
-fn matches(pattern: &str, name: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == name,
-        Some((head, rest)) => name
-            .strip_prefix(head)
-            .is_some_and(|tail| (0..=tail.len()).any(|at| tail.is_char_boundary(at) && matches(rest, &tail[at..]))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_star_stands_for_anything() {
-        let like = |pattern: &str| matches(pattern, "cell-4 r7");
-        assert!(like("*") && like("cell-*") && like("*r7") && like("c*4*7") && like("cell-4 r7"));
-        assert!(!like("cell") && !like("*r8") && !like("r7*"));
-    }
 }

@@ -3,7 +3,7 @@
 use super::site::site;
 use super::{PoseRequest, recorded, wish};
 use crate::description::RobotDescription;
-use crate::effect::{EffectContext, EffectStack, Load, identified, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
@@ -121,7 +121,7 @@ fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
 
 /// Whether poses can be asked for an effect of this name.
 pub fn is_known(effect: &str) -> bool {
-    whole(effect, &setting()).is_some()
+    arm_effect(effect, &setting()).is_some()
 }
 
 fn setting() -> EffectContext {
@@ -130,6 +130,6 @@ fn setting() -> EffectContext {
 
 fn model(robot: &RobotModel, effects: &[&str]) -> Model {
     let setting = setting();
-    let made = effects.iter().filter_map(|name| whole(name, &setting)).collect();
+    let made = effects.iter().filter_map(|name| arm_effect(name, &setting)).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
 }

@@ -3,7 +3,7 @@
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
 use crate::diagnose::{Question, wrong_setup};
-use crate::effect::{Effect, EffectContext, EffectStack, identified, names, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, names};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out};
 use crate::observation;
@@ -242,7 +242,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
         model.stack.parameters_of(names::REDUCTION_RATIO).filter(beyond).collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = whole(names::JOINT_COMPLIANCE, setting) else { return };
+    let Some(compliance) = arm_effect(names::JOINT_COMPLIANCE, setting) else { return };
     let asked = model.stack.effects().any(|(effect, _)| effect.name() == names::JOINT_COMPLIANCE);
     if suspects.is_empty() || asked {
         return;
@@ -258,7 +258,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     }
     // Known names first, compliance behind them: numbers of the first model stay valid in the second.
     let mut effects: Vec<Box<dyn Effect>> =
-        model.stack.effects().filter_map(|(effect, _)| whole(effect.name(), setting)).collect();
+        model.stack.effects().filter_map(|(effect, _)| arm_effect(effect.name(), setting)).collect();
     effects.push(compliance);
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
     rival.known.clone_from(&model.known);

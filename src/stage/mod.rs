@@ -54,6 +54,7 @@ pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use masses::{Masses, MassesReads, MassesWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
+pub(crate) use parameter_set::matches;
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Accepted, Report, ReportReads};
 pub use report_torques::{ReportTorques, ReportTorquesReads, ReportTorquesWrites};

@@ -118,7 +118,7 @@ fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
-pub(super) fn matches(pattern: &str, name: &str) -> bool {
+pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, tail)) => name
@@ -135,7 +135,7 @@ mod tests {
     fn a_star_stands_for_anything() {
         assert!(matches("reduction_ratio.*", "reduction_ratio.j2"));
         assert!(matches("*.j2", "reduction_ratio.j2"));
-        assert!(matches("*", "x"));
+        assert!(matches("*", "x") && matches("*r7", "cell-4 r7") && matches("c*4*7", "cell-4 r7"));
         assert!(matches("a*c*e", "abcde"));
         assert!(!matches("a*c", "abcd"));
         assert!(!matches("reduction_ratio", "reduction_ratio.j2"));

@@ -8,8 +8,8 @@ mod stops;
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::copied::{self, copied_rows};
+use crate::stage::matches;
 use crate::stage::named_column::NamedColumn;
-use crate::stage::parameter_set::matches;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;

@@ -5,7 +5,7 @@ mod comparison;
 mod source;
 
 use crate::diagnose::BASE;
-use crate::effect::{LONG_AFTER, names};
+use crate::effect::names;
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
 use crate::robot::{Measurements, RobotModel, Visited};
@@ -71,8 +71,7 @@ impl Stage for Transfer {
             ));
         }
         // Another recording has another clock: steps have happened, and the arm is warm. What lags follows the time between rows.
-        let start = (0..data.rows()).map(|row| data.time(row)).fold(f64::INFINITY, f64::min);
-        data.time = Some((0..data.rows()).map(|row| LONG_AFTER + data.time(row) - start).collect());
+        data.long_after = true;
         let source = CarriedFrom::of(&reads);
         let mut model = self.placed(&earlier, &reads, &data, &rows)?;
         let open: Vec<usize> = match self.free {

@@ -32,9 +32,54 @@ pub fn is_separable_by_poses(effect: &str) -> bool {
     cause(effect).is_none_or(|cause| cause.about().separable_by_poses)
 }
 
-fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &Finding)> {
-    (1..).zip(&diagnosis.findings)
+/// Findings with their ranks.
+pub(super) fn ranked<F>(findings: &[F]) -> impl Iterator<Item = (i64, &F)> {
+    (1..).zip(findings)
 }
+
+/// The tables of a diagnosis that stand beside its findings: their numbers, and their rivals.
+macro_rules! beside_findings {
+    ($diagnosis:ty => $numbers:ident of $number_row:ident, $rivals:ident of $rival_row:ident) => {
+        impl $numbers {
+            /// A row for each number of each finding.
+            pub fn of(diagnosis: &$diagnosis) -> Self {
+                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
+                    finding.parameters.iter().map(move |number| $number_row {
+                        rank,
+                        name: number.name.clone(),
+                        value: number.value,
+                        unit: number.unit.into(),
+                        sigma: number.sigma.filter(|sigma| sigma.is_finite()),
+                    })
+                });
+                let mut rows: Vec<$number_row> = rows.collect();
+                rows.sort_by(|a, b| (a.rank, &a.name).cmp(&(b.rank, &b.name)));
+                Self(rows)
+            }
+        }
+
+        impl $rivals {
+            /// A row for each rival of each finding.
+            pub fn of(diagnosis: &$diagnosis) -> Self {
+                let rows = $crate::table::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
+                    finding.rivals.iter().map(move |rival| $rival_row {
+                        rank,
+                        effect: rival.effect.into(),
+                        place: rival.place.to_string(),
+                        delta_bic: rival.delta_bic,
+                        probability: rival.probability.into(),
+                    })
+                });
+                let mut rows: Vec<$rival_row> = rows.collect();
+                rows.sort_by(|a, b| (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place)));
+                Self(rows)
+            }
+        }
+    };
+}
+pub(super) use beside_findings;
+
+beside_findings! { Diagnosis => FindingNumbers of FindingNumberRow, Rivals of RivalRow }
 
 impl Findings {
     /// A row for each finding.
@@ -44,7 +89,7 @@ impl Findings {
         let in_rad = |finding: &Finding| finding.valid.filter(|(joint, _)| turns(*joint)).map(|(_, range)| range);
         let in_mm =
             |finding: &Finding| finding.valid.filter(|(joint, _)| !turns(*joint)).map(|(_, range)| range.map(|q| 1e3 * q));
-        let rows = ranked(diagnosis).map(|(rank, finding)| FindingRow {
+        let rows = ranked(&diagnosis.findings).map(|(rank, finding)| FindingRow {
             rank,
             effect: finding.effect.into(),
             place: finding.place.to_string(),
@@ -67,41 +112,5 @@ impl Findings {
             forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
         });
         Self(rows.collect())
-    }
-}
-
-impl FindingNumbers {
-    /// A row for each number of each finding.
-    pub fn of(diagnosis: &Diagnosis) -> Self {
-        let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
-            finding.parameters.iter().map(move |number| FindingNumberRow {
-                rank,
-                name: number.name.clone(),
-                value: number.value,
-                unit: number.unit.into(),
-                sigma: number.sigma.filter(|sigma| sigma.is_finite()),
-            })
-        });
-        let mut rows: Vec<FindingNumberRow> = rows.collect();
-        rows.sort_by(|a, b| (a.rank, &a.name).cmp(&(b.rank, &b.name)));
-        Self(rows)
-    }
-}
-
-impl Rivals {
-    /// A row for each rival of each finding.
-    pub fn of(diagnosis: &Diagnosis) -> Self {
-        let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
-            finding.rivals.iter().map(move |rival| RivalRow {
-                rank,
-                effect: rival.effect.into(),
-                place: rival.place.to_string(),
-                delta_bic: rival.delta_bic,
-                probability: Some(rival.probability),
-            })
-        });
-        let mut rows: Vec<RivalRow> = rows.collect();
-        rows.sort_by(|a, b| (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place)));
-        Self(rows)
     }
 }

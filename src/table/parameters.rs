@@ -1,7 +1,7 @@
 //! The identified model: every parameter by name, with its status.
 
 use super::{ParameterRow, Parameters};
-use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, names, whole};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, arm_effect, identified, names};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
@@ -181,7 +181,7 @@ impl Parameters {
         let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
-        let whole = chosen.iter().filter_map(|name| whole(name, &setting));
+        let whole = chosen.iter().filter_map(|name| arm_effect(name, &setting));
         let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));

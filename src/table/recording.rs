@@ -104,6 +104,7 @@ impl Recording {
                 })
                 .collect(),
             sequence: None,
+            long_after: false,
             memories: Memories::default(),
         };
         data.sequence = data.time.as_ref().and_then(|time| Sequence::by_time(time, |a, b| data.near_pose(a, b)));

@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::effect::{
     CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, ParameterSpec, Place, Summary,
-    Survey, cause, hypotheses, people, whole,
+    Survey, arm_effect, cause, hypotheses, people,
 };
 use calib::robot::{LoadCorrection, Measurements, PointReadings, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -48,7 +48,7 @@ fn survey_of<'a>(
 fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let mut posture = Posture::new(robot.joints());
     let mut out = Vec::new();
-    let stack = EffectStack::new(robot, Pose::identity(), vec![whole("joint_compliance", &setting()).expect("a cause")]);
+    let stack = EffectStack::new(robot, Pose::identity(), vec![arm_effect("joint_compliance", &setting()).expect("a cause")]);
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
         let motion = stack.point_motion(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
@@ -86,7 +86,7 @@ fn over_all(mut law: impl FnMut(&Survey, &Hypothesis)) -> usize {
 fn stack(robot: &RobotModel, form: &Form, first: bool) -> (EffectStack, std::ops::Range<usize>) {
     let setting = setting();
     let mut effects =
-        vec![whole("joint_compliance", &setting).expect("a cause"), whole("joint_offset", &setting).expect("a cause")];
+        vec![arm_effect("joint_compliance", &setting).expect("a cause"), arm_effect("joint_offset", &setting).expect("a cause")];
     effects.insert(if first { 0 } else { 2 }, Box::new(form.clone()));
     let stack = EffectStack::new(robot, setting.base, effects);
     let range = stack.effects().find(|(effect, _)| effect.form().is_some()).expect("the form").1;
@@ -122,7 +122,7 @@ fn a_form_without_size_moves_nothing_and_its_partials_are_central_differences() 
         let (stack, own) = stack(robot, form, false);
         let without = EffectStack::new(robot, setting().base, {
             let names = ["joint_compliance", "joint_offset"];
-            names.map(|name| whole(name, &setting()).expect("a cause")).into()
+            names.map(|name| arm_effect(name, &setting()).expect("a cause")).into()
         });
         let none = at(&stack, &own, &vec![0.0; own.len()]);
         let bare: Vec<f64> = none[..own.start].to_vec();

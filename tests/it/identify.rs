@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::description::RobotDescription;
-use calib::effect::{EffectContext, EffectStack, Load, whole};
+use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -26,7 +26,7 @@ pub fn normal(index: usize) -> f64 {
 
 pub fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
     let setting = EffectContext { base, load: Load::GravityTorque };
-    let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
+    let made = effects.iter().map(|name| arm_effect(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 

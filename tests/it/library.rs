@@ -8,7 +8,7 @@ use crate::fixture;
 use crate::identify::{model, normal};
 use crate::readme::example;
 use calib::diagnose::VerdictKind;
-use calib::effect::{Effect, EffectContext, EffectStack, GearCyclic, Load, Place, whole};
+use calib::effect::{Effect, EffectContext, EffectStack, GearCyclic, Load, Place, arm_effect};
 use calib::estimate::Model;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
@@ -59,7 +59,7 @@ fn missing_physics_is_named_from_arrays() {
     let mut data = rows(&robot, 160);
     let gear: Box<dyn Effect> = Box::new(calib::effect::Form::from(GearCyclic::term(2, 5, false)));
     let context = EffectContext { base: base(), load: Load::GravityTorque };
-    let effects = vec![whole("joint_offset", &context).expect("a cause"), gear];
+    let effects = vec![arm_effect("joint_offset", &context).expect("a cause"), gear];
     let mut truth = Model::nominal(robot.clone(), EffectStack::new(&robot, base(), effects));
     let sine = truth.x.len() - 2;
     truth.x[sine] = 1e-4;

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::description::RobotDescription;
-use calib::effect::{EffectContext, EffectStack, Load, identified, whole};
+use calib::effect::{EffectContext, EffectStack, Load, arm_effect, identified};
 use calib::estimate::choose::{Aim, DesignRequest, Proposal, Score, Site, median, propose};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
 use calib::robot::{Measurements, RobotModel};
@@ -31,7 +31,7 @@ fn wish(aim: Aim) -> DesignRequest {
 fn model(robot: &RobotDescription, effects: &[&str]) -> Model {
     let robot = RobotModel::new(robot.clone());
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
+    let made = effects.iter().map(|name| arm_effect(name, &setting).expect("registered")).collect();
     let stack = EffectStack::new(&robot, setting.base, made);
     Model::nominal(robot, stack)
 }

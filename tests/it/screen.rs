@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::description::RobotDescription;
-use calib::effect::{EffectContext, EffectStack, Load, whole};
+use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
 use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -30,7 +30,7 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
 
 fn model(robot: &RobotModel, base: Pose) -> Model {
     let setting = EffectContext { base, load: Load::GravityTorque };
-    let made = EFFECTS.iter().map(|name| whole(name, &setting).expect("registered")).collect();
+    let made = EFFECTS.iter().map(|name| arm_effect(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 

@@ -4,7 +4,7 @@ use crate::fixture;
 use calib::description::RobotDescription;
 use calib::effect::{
     Clock, Deflection, Direction, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place, Summary,
-    Survey, hypotheses, people, whole,
+    Survey, arm_effect, hypotheses, people,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::Pose;
@@ -24,7 +24,7 @@ fn data(robot: &RobotModel) -> Measurements {
 
 fn stack(robot: &RobotModel) -> EffectStack {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    EffectStack::new(robot, setting.base, vec![whole("joint_compliance", &setting).expect("a cause")])
+    EffectStack::new(robot, setting.base, vec![arm_effect("joint_compliance", &setting).expect("a cause")])
 }
 
 /// Load torques of every row (Nm), row-major, and what each number of a form turns its joint by.

@@ -1,10 +1,10 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::{Form, LONG_AFTER, PlacementBuffers, Variable};
+use crate::effect::{Form, PlacementBuffers, Variable};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
-use crate::robot::{Measurements, Memories};
+use crate::robot::{Measurements, Memories, RowTime};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
@@ -17,8 +17,8 @@ pub struct Circumstance {
     pub payload: f64,
     /// C; none: that of the first recorded row.
     pub temperature: Option<f64>,
-    /// s of the recording's clock.
-    pub time: f64,
+    /// By the clock of the recording.
+    pub time: RowTime,
     /// Side from which each joint comes to rest, +1 or -1; 0 where unknown.
     pub direction: Vec<f64>,
     /// A, for models whose compliance is by motor current.
@@ -28,7 +28,7 @@ pub struct Circumstance {
 impl Circumstance {
     /// No payload, warm, nothing known of the approach.
     pub fn unknown(joints: usize) -> Self {
-        Self { payload: 0.0, temperature: None, time: LONG_AFTER, direction: vec![0.0; joints], current: None }
+        Self { payload: 0.0, temperature: None, time: RowTime::LongAfter, direction: vec![0.0; joints], current: None }
     }
 
     /// Those under which a row was measured.
@@ -36,7 +36,7 @@ impl Circumstance {
         Self {
             payload: data.payload[row],
             temperature: data.temperature(row),
-            time: data.time(row),
+            time: data.row_time(row),
             direction: (0..data.joints).map(|joint| data.direction(row, joint)).collect(),
             current: data.current(row).map(<[f64]>::to_vec),
         }
@@ -112,7 +112,7 @@ impl IdentifiedArm {
             joints,
             q: vec![0.0; joints],
             payload: vec![0.0],
-            time: Some(vec![LONG_AFTER]),
+            long_after: true,
             direction: Some(vec![0.0; joints]),
             ..Measurements::default()
         };
@@ -125,7 +125,7 @@ impl IdentifiedArm {
 
 /// A law that a command takes beyond the rows that it was fitted to.
 pub(super) struct BeyondFitted {
-    /// Of its form, in the stack.
+    /// Parameters of its form, in the stack.
     pub parameters: Range<usize>,
     /// What it is a function of.
     pub variable: Variable,
@@ -151,9 +151,10 @@ impl Reach<'_> {
         let Circumstance { payload, temperature, time, direction, current } = circumstance;
         self.data.payload[0] = *payload;
         self.data.temperature = temperature.map(|value| vec![value]);
-        let clock = self.data.time.get_or_insert_default();
-        clock.clear();
-        clock.push(*time);
+        (self.data.time, self.data.long_after) = match time {
+            RowTime::At(time) => (Some(vec![*time]), false),
+            RowTime::LongAfter => (None, true),
+        };
         self.data.direction.get_or_insert_default().clone_from(direction);
         self.data.current.clone_from(current);
         self.data.memories = Memories::default();

@@ -15,7 +15,7 @@ pub struct CorrectedCommand {
     pub residual: f64,
     /// Steps of the solution.
     pub iterations: usize,
-    /// Of the point that is reached; none where the model has no covariance.
+    /// Uncertainty of the point that is reached; none where the model has no covariance.
     pub uncertainty: Option<PositionUncertainty>,
     /// How certain its correction is along its own direction; none where the model has no covariance.
     pub certainty: Option<CorrectionUncertainty>,

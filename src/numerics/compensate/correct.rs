@@ -5,9 +5,8 @@ use super::{
     StatedPosture, ToolGoal, Uncertainty, beyond_limits, inverse, least_change, one_step,
     posture::{CountedArm, inverse_in},
 };
-use crate::effect::LONG_AFTER;
 use crate::error::counted;
-use crate::robot::{JointConvention, RobotModel};
+use crate::robot::{JointConvention, RobotModel, RowTime};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -74,7 +73,7 @@ pub struct CorrectionOptions {
 }
 
 impl CorrectionOptions {
-    /// Of targets that say all there is, with joints counted so.
+    /// Options for targets that say all there is, with joints counted so.
     pub fn counted_by(convention: JointConvention) -> Self {
         Self {
             convention,
@@ -99,7 +98,7 @@ pub struct Corrector<'a> {
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
-    /// Of the nominal arm, where it has some.
+    /// The sides of the nominal arm, where it has some.
     sides: Option<ArmSides>,
     /// What of the model depends on motor currents.
     by_current: Option<String>,
@@ -121,7 +120,7 @@ pub struct CorrectionTotals {
     pub uncorrected_sum: f64,
     /// m.
     pub uncorrected_max: f64,
-    /// Of those that are reached.
+    /// Largest residual of those that are reached, m.
     pub residual_max: f64,
     /// Targets without a solution.
     pub not_reached: u64,
@@ -262,10 +261,11 @@ impl<'a> Corrector<'a> {
         self.last.get_or_insert_default().clone_from(&home);
         let fixed = self.manner.direction.map(|direction| vec![direction; n]);
         let stated = target.direction.or(fixed).map(|sides| changed(sides, |sides| self.manner.convention.turn_sides(sides)));
+        let stated_time = target.time.or(self.manner.time).filter(|_| self.manner.clock);
         let circumstance = Circumstance {
             payload: target.payload.unwrap_or(self.manner.payload),
             temperature: target.temperature.or(self.manner.temperature),
-            time: target.time.or(self.manner.time).filter(|_| self.manner.clock).unwrap_or(LONG_AFTER),
+            time: stated_time.map_or(RowTime::LongAfter, RowTime::At),
             direction: stated.unwrap_or_else(|| self.direction.clone()),
             current: target.current,
         };

@@ -55,7 +55,7 @@ impl Uncertainty {
         if all.is_empty() { 0.0 } else { median(all) }
     }
 
-    /// Of the correction (m, tracker frame) that brought the command to `q`, under the circumstances that `reach` is set to.
+    /// How certain the correction (m, tracker frame) is that brought the command to `q`, under the circumstances that `reach` is set to.
     pub fn of_correction(&self, reach: &mut Reach, q: &[f64], correction: &Vector3<f64>) -> CorrectionUncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q).into_iter().filter(|one| one.share > SLACK).collect();
         let size = correction.norm();

@@ -37,7 +37,7 @@ impl StatedPosture {
         Self { ranges: vec![None; joints], sides: [None; 3] }
     }
 
-    /// Of so many joints; `quadrants` are joints, from 0, with their quarter turns: 0 from 0 to 90 deg, -1 from -90 to 0 deg.
+    /// A posture of so many joints; `quadrants` are joints, from 0, with their quarter turns: 0 from 0 to 90 deg, -1 from -90 to 0 deg.
     pub fn of_quadrants(joints: usize, quadrants: &[(usize, i32)]) -> Self {
         let mut out = Self::free(joints);
         for (joint, quadrant) in quadrants {
@@ -52,7 +52,7 @@ impl StatedPosture {
         Self { ranges: below.iter().map(range).collect(), ..Self::free(below.len()) }
     }
 
-    /// Of so many joints, on these sides.
+    /// A posture of so many joints, on these sides.
     pub fn of_sides(joints: usize, sides: StatedSides) -> Self {
         Self::free(joints).on(sides)
     }

@@ -38,7 +38,7 @@ pub fn rigid(model: &Model) -> RobotDescription {
     for (j, (joint, velocity)) in out.joints.iter_mut().zip(reach.velocities()).enumerate() {
         let (v, w): (Vector3<f64>, Vector3<f64>) = parts(velocity);
         if nominal.is_revolute(j) {
-            // Of the axis the point nearest to the nominal one.
+            // The axis is placed by its point that is nearest to the nominal one.
             let near = tool.translation + w.cross(&v);
             joint.axis = w.into();
             joint.point = (near + w * w.dot(&(nominal.point(j) - near))).into();

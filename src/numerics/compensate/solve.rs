@@ -107,7 +107,7 @@ impl CommandSolution {
 
 /// The joint positions nearest to `home` at which `chain` is where it is wanted, by Newton's method from `start`.
 ///
-/// Of redundant joints the change from `home` is least in the sum of squares (1 rad counts as 1 m). Steps are damped where the arm
+/// Redundant joints change least from `home`, in the sum of squares (1 rad counts as 1 m). Steps are damped where the arm
 /// is singular; what cannot be reached is approached, and the residual says so.
 pub fn least_change(chain: &mut impl Chain, wanted: &ToolGoal, start: &[f64], home: &[f64]) -> CommandSolution {
     let mut q = start.to_vec();

@@ -39,14 +39,14 @@ pub struct Uncertainty {
     row: Vec<Option<usize>>,
     /// Effects at places, those of the arm.
     sources: Vec<Source>,
-    /// Of the stack.
+    /// Names of the stack's parameters.
     names: Vec<String>,
     /// m, 95 %: what is usual at the recorded poses.
     pub(super) usual: f64,
 }
 
 impl Uncertainty {
-    /// Of the parameters of `arm`; what belonged to the measurement alone does not blur the arm.
+    /// The uncertainty that the parameters of `arm` have; what belonged to the measurement alone does not blur the arm.
     pub fn new(arm: &IdentifiedArm, covariance: Covariance, scatter: Scatter) -> Self {
         let mut row = vec![None; arm.model().x.len()];
         covariance.parameters().iter().enumerate().for_each(|(k, parameter)| row[*parameter] = Some(k));

@@ -30,8 +30,7 @@ pub fn against_simulation(
     out.readings.clear();
     for row in 0..data.rows() {
         if there(&row) {
-            let seat = robot.mounting(robot.setup().target(data.target(row)));
-            let rigid = (robot.last_body(data.q(row)) * *seat).translation;
+            let rigid = (robot.last_body(data.q(row)) * *robot.mounting_at(data, row)).translation;
             out.points.shift(row, base.point(&rigid) - frame.point(&point(row)));
         } else {
             out.points.forget(row);

@@ -6,7 +6,7 @@ use super::whitened::WhitenedProblem;
 use crate::criteria::search::RIVAL_LEVELS;
 use crate::effect::{
     Cause, DeclaredCause, DeclaredForm, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown,
-    hypotheses, whole,
+    arm_effect, hypotheses,
 };
 use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, DiscriminationProblem};
@@ -115,7 +115,7 @@ fn with(model: &Model, form: &Form) -> Model {
     let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
         match effect.form() {
             Some(form) => Some(Box::new(form.clone())),
-            None => whole(effect.name(), &setting),
+            None => arm_effect(effect.name(), &setting),
         }
     };
     let mut effects: Vec<Box<dyn Effect>> = model.stack.effects().filter_map(|(effect, _)| again(effect)).collect();

@@ -40,7 +40,7 @@ pub struct JointRepeatability {
     pub repeats: usize,
 }
 
-/// How well a finding stands.
+/// How well a finding stands; of torques, lengths are Nm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Evidence {
     /// Of the finding beside all others.
@@ -50,11 +50,12 @@ pub struct Evidence {
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
     /// Fall of the rms error of fitted rows under fits that did not see their pose, m; `None` where poses are too few, or several effects
-    /// make up the finding.
+    /// make up the finding. Of torques: of held-out rows over all joints when what is left is fitted again (left as it is for wrong masses,
+    /// for which tolerances would bend); `None` where none are held out.
     pub heldout_gain: Option<f64>,
     /// Rms of the whole effect over the recording, m.
     pub effect_rms: f64,
-    /// Fall of the whitened squared residual.
+    /// Fall of the whitened squared residual; of torques counted by effective rows.
     pub gain: f64,
 }
 

@@ -16,11 +16,11 @@ pub struct Inertial {
 /// How far declared inertials may be off without being a finding: one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertialTolerance {
-    /// Of a mass, as a share of it.
+    /// Tolerance of a mass, as a share of it.
     pub mass_relative: f64,
-    /// Of each coordinate of a centre, m.
+    /// Tolerance of each coordinate of a centre, m.
     pub centre: f64,
-    /// Of an inertia, as a share of its largest diagonal element.
+    /// Tolerance of an inertia, as a share of its largest diagonal element.
     pub inertia_relative: f64,
 }
 
@@ -35,9 +35,9 @@ pub struct DynamicArm {
     pub prismatic: Vec<bool>,
     /// The tool point, m.
     pub tool: Point3<f64>,
-    /// Of the links, length n; `None` where nothing is declared: then the base parameters are identified.
+    /// Bodies of the links, length n; `None` where nothing is declared: then the base parameters are identified.
     pub links: Option<Vec<Inertial>>,
-    /// Of the declared payload; `None` for none.
+    /// The declared payload; `None` for none.
     pub payload: Option<Inertial>,
     /// m/s^2, base frame: (0, 0, -9.81) for an arm on the floor.
     pub gravity: Vector3<f64>,
@@ -45,7 +45,7 @@ pub struct DynamicArm {
     pub ratio: Vec<f64>,
     /// Pairs (moved, by) of joints, from 0, whose gears are known to be coupled.
     pub coupled: Vec<(usize, usize)>,
-    /// Of links, and of last link and payload together.
+    /// Tolerance of links, and of last link and payload together.
     pub tolerance: InertialTolerance,
 }
 

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use nalgebra::{Point3, Vector3};
 
-    /// Of six turning joints that have nothing in common, the first one along `first`.
+    /// Base parameters of six turning joints that have nothing in common, the first one along `first`.
     fn count(first: Vector3<f64>) -> usize {
         let axes = [[0.2, -1.0, 0.3], [0.1, -0.9, 0.5], [1.0, 0.2, -0.4], [0.3, 1.0, 0.6], [0.9, -0.1, 0.7]];
         let arm = DynamicArm {

@@ -7,7 +7,7 @@ use super::sweep::SweptColumns;
 use super::types::EnforcedBodies;
 use nalgebra::{DMatrix, DVector};
 
-/// Of the largest: an eigenvalue below it is none.
+/// Share of the largest eigenvalue below which one is none.
 const NOTHING: f64 = 1e-13;
 
 /// Coefficients at which all links are bodies, nearest in the metric of their covariance; `None` where they are already, or where no masses

@@ -12,18 +12,18 @@ const AROUND: usize = 2;
 /// A recording without small gaps.
 pub(super) struct Bridged {
     pub recording: TorqueRecording,
-    /// Of each row: the recorded one, or the one before it where it is made up.
+    /// The recorded row of each, or the one before it where it is made up.
     pub origin: Vec<usize>,
 }
 
 impl Bridged {
-    /// Of a checked recording.
+    /// Bridges the gaps of a checked recording.
     pub fn of(recording: TorqueRecording) -> Self {
         let usual = ClockPace::usual_step(&recording);
         Self::by_steps(recording, usual)
     }
 
-    /// Of rows that usually come every so many s.
+    /// The same of rows that usually come every so many s.
     pub fn by_steps(recording: TorqueRecording, usual: f64) -> Self {
         let lost = lost(&recording, usual);
         let rows = recording.rows();
@@ -31,7 +31,7 @@ impl Bridged {
             return Self { recording, origin: (0..rows).collect() };
         }
         let mut origin = Vec::with_capacity(rows + lost.iter().map(|(_, count)| count).sum::<usize>());
-        // Of each row: how far it is from its origin to the next recorded row, as a share, and steps of the clock between these.
+        // How far each row is from its origin to the next recorded row, as a share, and steps of the clock between these.
         let mut shares = Vec::with_capacity(origin.capacity());
         let mut next = lost.iter().peekable();
         for row in 0..rows {

@@ -28,7 +28,7 @@ const PAYLOAD: &str = "payload";
 pub struct DiagnosedRecording<'a> {
     /// All rows are fitted, held-out ones too.
     pub recording: &'a dyn TorqueSource,
-    /// Of this recording.
+    /// The model of this recording.
     pub model: &'a TorqueModel,
     /// Rows in which something touches the arm.
     pub events: &'a [ContactEvent],
@@ -43,7 +43,7 @@ pub struct TorqueChange {
     pub effect: String,
     /// Where it acts.
     pub place: Place,
-    /// Of `change` and `sigma`.
+    /// Unit of `change` and `sigma`.
     pub unit: &'static str,
     /// In the second recording less the first; of a payload's centre where it is, m, base frame at zero pose.
     pub change: f64,
@@ -204,7 +204,7 @@ fn told(
         if mass.abs() > LIGHTEST && count == INERTIAL_NUMBERS {
             for (axis, name) in ["centre_x", "centre_y", "centre_z"].iter().enumerate() {
                 let (moment, place) = (values[1 + axis], 1 + axis);
-                // Of moment over mass.
+                // The slope of moment over mass.
                 let slope = [-moment / (mass * mass), 1.0 / mass];
                 let entry = |a: usize, b: usize| covariance[a * count + b];
                 let variance = slope[0] * slope[0] * entry(0, 0)

@@ -23,7 +23,7 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const LEAST_RANGE: f64 = 0.1;
 /// m: points of an arm are nearer to the base.
 const FARTHEST: f64 = 50.0;
-/// Of the correlation of recorded and differentiated velocity.
+/// Correlation of recorded and differentiated velocity above which they are the same.
 const SAME_VELOCITY: f64 = 0.5;
 
 /// All faults of sizes and numbers.

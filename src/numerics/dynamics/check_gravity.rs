@@ -8,9 +8,9 @@ use super::recording::TorqueRecording;
 use crate::error::Fault;
 use crate::statistics::nearest;
 
-/// Of torque measured over simulated: beyond it, or below its inverse, a unit is wrong.
+/// Ratio of measured to simulated torque: beyond it, or below its inverse, a unit is wrong.
 const UNIT_RATIO: f64 = 50.0;
-/// Of the squared error with another reading of the columns over that without.
+/// Ratio of the squared error with another reading of the columns to that without.
 const EXCHANGED: f64 = 0.2;
 /// Nm: below it gravity shows nothing of units.
 const SMALL_TORQUE: f64 = 1e-3;

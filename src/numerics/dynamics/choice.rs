@@ -6,7 +6,7 @@ use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 use crate::effect::Place;
 
-/// Of the largest coefficient of a form (per rad/s, or of its sign): less is none.
+/// Share of the largest coefficient of a form (per rad/s, or of its sign) below which one is none.
 const NEARLY_ZERO: f64 = 0.2;
 /// What a finding must gain beyond its penalty to be named: twice the logarithm of odds of 50 to 1.
 pub(super) const CLEAR: f64 = 8.0;

@@ -19,19 +19,19 @@ pub(super) struct RecordingClock {
 }
 
 impl RecordingClock {
-    /// Of a motion of one trajectory in even steps, s.
+    /// The clock of a motion of one trajectory in even steps, s.
     pub fn even(time: &[f64]) -> Self {
         let rows = time.len();
         let rate = (rows - 1) as f64 / (time[rows - 1] - time[0]);
         Self { rate, stretches: std::iter::once(0..rows).collect() }
     }
 
-    /// Of a checked recording.
+    /// The clock of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
         Self::paced(recording, &ClockPace::of(recording))
     }
 
-    /// Of rows of a recording whose pace is known.
+    /// The clock of rows of a recording whose pace is known.
     pub fn paced(recording: &TorqueRecording, pace: &ClockPace) -> Self {
         let mut stretches = Vec::new();
         let mut start = 0;
@@ -55,7 +55,7 @@ pub(super) struct ClockPace {
 }
 
 impl ClockPace {
-    /// Of a checked recording.
+    /// The pace of a checked recording.
     pub fn of(recording: &TorqueRecording) -> Self {
         let fastest = |joint: usize| {
             let mut all: Vec<f64> = (1..recording.rows()).map(|row| step(recording, row, joint)).collect();

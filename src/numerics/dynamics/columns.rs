@@ -12,9 +12,9 @@ pub(super) struct TorqueColumns {
     pub columns: Vec<TorqueColumn>,
     /// Number of base columns.
     pub base: usize,
-    /// Of the base: the link, and the change of its numbers per coefficient.
+    /// Link and change of its numbers per coefficient of the base.
     pub base_changes: Vec<(usize, [f64; INERTIAL_NUMBERS])>,
-    /// Of the base: 1 / variance of each coefficient beforehand.
+    /// 1 / variance beforehand of each coefficient of the base.
     pub prior: Vec<f64>,
     pub forms: Vec<TorqueForm>,
     /// Forms that causes list; later ones are trials of a refinement.

@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
 /// Mass below which there is no centre, kg.
 const LIGHTEST: f64 = 1e-9;
-/// Of the mass times the square of the distance (m2): the least second moment that a nearest body is given.
+/// Least second moment (m2) that a nearest body is given, as a share of its mass.
 const LEAST_SPREAD: f64 = 1e-4;
-/// Of a number's standard deviation: step of a derivative.
+/// Step of a derivative, as a share of a number's standard deviation.
 const STEP: f64 = 1e-3;
 
 /// The spread of a link's mass.
@@ -35,7 +35,7 @@ impl BodyConsistency {
 }
 
 impl TorqueModel {
-    /// Of the links whose ten numbers are all identified.
+    /// The consistency of the links whose ten numbers are all identified.
     pub fn consistency(&self) -> Vec<BodyConsistency> {
         (0..self.joints()).filter(|link| self.is_whole(*link)).map(|link| self.consistency_of(link)).collect()
     }

@@ -27,12 +27,12 @@ pub(super) struct MotionPace {
     joints: Vec<JointPace>,
 }
 
-/// Of one joint.
+/// The sums of one joint.
 #[derive(Debug, Clone, Copy, Default)]
 struct JointPace {
     /// Squared velocity, and squared angle about the mean of its stretch, summed over rows of all stretches that have ended.
     ended: [f64; 2],
-    /// Of the present stretch: rows, mean angle and squares about it; rows of which a velocity is known, and its squares.
+    /// Sums of the present stretch: rows, mean angle and squares about it; rows of which a velocity is known, and its squares.
     rows: f64,
     mean: f64,
     apart: f64,
@@ -64,7 +64,7 @@ impl JointPace {
 }
 
 impl MotionPace {
-    /// Of no rows of n joints.
+    /// The sums of no rows of n joints.
     pub fn new(joints: usize) -> Self {
         Self { joints: vec![JointPace::default(); joints] }
     }

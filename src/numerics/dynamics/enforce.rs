@@ -10,11 +10,11 @@ use std::f64::consts::SQRT_2;
 
 /// Steps, at most.
 const STEPS: usize = 20_000;
-/// Of the scaled pseudo-inertias: change between two steps at which it ends.
+/// Change of the scaled pseudo-inertias between two steps at which it ends.
 const SETTLED: f64 = 1e-10;
 /// Least eigenvalue of a scaled pseudo-inertia, of its trace: a body, and not just its limit.
 const LEAST: f64 = 1e-6;
-/// Of the trace: an eigenvalue below it is rounded.
+/// Share of the trace below which an eigenvalue is rounded.
 const ROUNDED: f64 = 1e-12;
 /// Steps between two looks at the weight of the two directions.
 const LOOK: usize = 50;
@@ -108,7 +108,7 @@ struct ConeMap {
 const ENTRIES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
 
 impl ConeMap {
-    /// Of a link; scaled by its extent, so that masses and second moments have one size.
+    /// The pseudo-inertia of a link, scaled by its extent, so that masses and second moments have one size.
     fn of(ten: &[f64]) -> Self {
         let second = 0.5 * (ten[4] + ten[7] + ten[9]);
         let extent = if ten[0] > 0.0 && second > 0.0 { (second / ten[0]).sqrt() } else { EXTENT };
@@ -175,7 +175,7 @@ mod tests {
         rod.into_iter().chain(ball).collect()
     }
 
-    /// Of numbers that have much to do with each other.
+    /// A covariance of numbers that have much to do with each other.
     fn covariance() -> DMatrix<f64> {
         let mut dice = ChaCha8Rng::seed_from_u64(7);
         let sizes: Vec<f64> = (0..20).map(|number| if number % 10 < 4 { 0.02 } else { 0.004 }).collect();

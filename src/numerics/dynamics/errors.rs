@@ -11,7 +11,7 @@ pub(super) fn rests(problem: &TorqueProblem, joint: usize, row: usize) -> bool {
     problem.scene.velocity[joint][problem.reduction.rows[row]].abs() < REST * problem.scene.width_at(joint)
 }
 
-/// Of a residual (`[joint][judged row]`, Nm) in some rows.
+/// Errors by a residual (`[joint][judged row]`, Nm) in some rows.
 pub(super) fn errors(problem: &TorqueProblem, residual: &[Vec<f64>], rows: &[usize]) -> TorqueErrors {
     let n = problem.joints();
     let rms = |joint: usize, counts: &dyn Fn(usize) -> bool| {

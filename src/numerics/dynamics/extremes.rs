@@ -3,7 +3,7 @@
 
 use crate::error::Fault;
 
-/// Of rows at one extreme value: a torque that is cut off.
+/// Share of rows at one extreme value: a torque that is cut off.
 const SATURATED: f64 = 0.02;
 /// Rows at least of those.
 const SATURATED_ROWS: usize = 40;
@@ -19,7 +19,7 @@ pub(super) struct TorqueExtremes {
 }
 
 impl TorqueExtremes {
-    /// Of no rows of n joints.
+    /// The extremes of no rows of n joints.
     pub fn new(joints: usize) -> Self {
         Self { rows: 0, joints: vec![[(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)]; joints] }
     }

@@ -9,9 +9,6 @@ use super::scene::{DynamicScene, column};
 use crate::effect::Place;
 use crate::error::{Error, Result};
 
-/// s: longer ago than any gear warms up.
-const LONG_AGO: f64 = 1e6;
-
 /// A motion of n joints at an even clock; lists are row-major (rows x n).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMotion {
@@ -134,7 +131,8 @@ impl TorqueModel {
         scene.turn_over(self.sign_width);
         scene.turn_each_over(self.range.iter().map(|range| range.sign_width));
         scene.friction_lead = self.friction_lead;
-        let begun = motion.since_start.unwrap_or(LONG_AGO);
+        // A warm arm began to move longer ago than any time constant: what fades has faded.
+        let begun = motion.since_start.unwrap_or(f64::INFINITY);
         scene.time.iter_mut().for_each(|time| *time += begun);
         let columns = |all: &Vec<f64>| (0..n).map(|joint| column(all, n, joint)).collect::<Vec<Vec<f64>>>();
         if let Some(velocity) = &motion.velocity {

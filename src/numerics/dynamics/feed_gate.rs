@@ -13,7 +13,7 @@ const ASIDE: f64 = 0.02;
 const WARMER: f64 = 1.0;
 /// So many times what is usual in the recorded motion an uncertainty is worth a remark, however small the correction; twice as much is refused.
 const USUAL: f64 = 3.0;
-/// Of the correction: an uncertainty above it is worth a remark.
+/// Share of the correction above which an uncertainty is worth a remark.
 const HALF: f64 = 0.5;
 
 /// The limit, and whether a person insists on what it refuses.

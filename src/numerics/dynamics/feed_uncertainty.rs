@@ -53,7 +53,7 @@ impl TorqueModel {
         Some(all)
     }
 
-    /// Of each inertial number: where it stands in the covariance.
+    /// Where each inertial number stands in the covariance.
     fn places(&self) -> Vec<Option<usize>> {
         let mut next = 0;
         let place = |known: &bool| {

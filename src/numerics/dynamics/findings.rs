@@ -5,8 +5,8 @@ use super::choice::CauseChoice;
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
-use super::types::{ContactEvent, TorqueEvidence, TorqueFinding, TorqueParameter, TorqueRival};
-use crate::diagnose::Probabilities;
+use super::types::{ContactEvent, TorqueFinding, TorqueParameter};
+use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
 
@@ -63,7 +63,7 @@ fn finding(
         place: form.place,
         statement: form.cause.statement(form, &fitted),
         parameters: with_shapes(form.cause.parameters(form, &fitted), form, |index| slopes.sigma(uncertain, number, index)),
-        evidence: TorqueEvidence {
+        evidence: Evidence {
             gain: loss.square,
             f_statistic: loss.square / rank,
             p_value: tail(loss.square / rank, rank, FREEDOM),
@@ -108,9 +108,9 @@ fn held_out_gain(problem: &TorqueProblem, without: &[(usize, f64)], solution: &[
 }
 
 /// Other names or places that explain nearly as much, the best form of each; closest first.
-fn rivals(choice: &CauseChoice, rest: &[usize], without: &SweptColumns, number: usize, gain: f64) -> Vec<TorqueRival> {
+fn rivals(choice: &CauseChoice, rest: &[usize], without: &SweptColumns, number: usize, gain: f64) -> Vec<RivalCause> {
     let own = gain - choice.penalty(number, choice.form(number).width);
-    let mut rivals: Vec<TorqueRival> = Vec::new();
+    let mut rivals: Vec<RivalCause> = Vec::new();
     let others = (0..choice.open).filter(|other| choice.compete(*other, number) && choice.may_join(*other, rest));
     for other in others.filter(|other| !choice.form(*other).is_called_as(choice.form(number))) {
         let form = choice.form(other);
@@ -118,7 +118,7 @@ fn rivals(choice: &CauseChoice, rest: &[usize], without: &SweptColumns, number: 
         if delta_bic > FARTHEST {
             continue;
         }
-        let rival = TorqueRival { effect: form.cause.name(), place: form.place, delta_bic, probability: 0.0 };
+        let rival = RivalCause { effect: form.cause.name(), place: form.place, delta_bic, probability: 0.0 };
         match rivals.iter_mut().find(|known| known.effect == rival.effect && known.place == rival.place) {
             Some(known) => known.delta_bic = known.delta_bic.min(delta_bic),
             None => rivals.push(rival),
@@ -156,7 +156,7 @@ pub(super) fn plain_finding(
         place,
         statement,
         parameters,
-        evidence: TorqueEvidence {
+        evidence: Evidence {
             gain,
             f_statistic: gain / columns,
             p_value: tail(gain / columns, columns, FREEDOM),

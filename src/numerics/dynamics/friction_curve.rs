@@ -10,7 +10,7 @@ use crate::effect::Place;
 /// Velocities on either side of zero.
 const POINTS: usize = 30;
 
-/// Of every joint whose set has friction.
+/// The curve of every joint whose set has friction.
 pub(super) fn friction_curves(
     problem: &TorqueProblem,
     set: &[usize],

@@ -20,7 +20,7 @@ const GAIN: f64 = 200.0;
 const MOVED_GAIN: f64 = 30.0;
 /// The same of one joint, to agree.
 const OWN_GAIN: f64 = 10.0;
-/// Of the joints that must agree.
+/// Share of the joints that must agree.
 const AGREEING: f64 = 0.6;
 
 /// What is left, by which lead and by what change of the latency, s.

@@ -46,7 +46,7 @@ pub(super) struct DeclaredInertials {
 }
 
 impl DeclaredInertials {
-    /// Of an arm that declares its links.
+    /// The inertial numbers of an arm that declares its links.
     pub fn of(arm: &DynamicArm, bodies: &[Inertial]) -> Self {
         let last = bodies.len() - 1;
         let point = |link: usize| arm.points[link].coords;
@@ -75,7 +75,7 @@ impl DeclaredInertials {
     }
 }
 
-/// Of 1 kg.
+/// A payload of 1 kg.
 fn unit_payload(arm: &DynamicArm) -> Inertial {
     match &arm.payload {
         Some(payload) if payload.mass > 0.0 => Inertial { mass: 1.0, inertia: payload.inertia / payload.mass, ..*payload },
@@ -99,7 +99,7 @@ fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3]
 
 /// Change of a body's numbers by one standard deviation of each of its own.
 fn tolerance(arm: &DynamicArm, body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS] {
-    /// Of a coordinate of the centre: small against its tolerance, as an inertia is quadratic in it.
+    /// Step of a coordinate of the centre: small against its tolerance, as an inertia is quadratic in it.
     const STEP: f64 = 1e-2;
     let base = numbers(body, point);
     let largest = (0..3).map(|axis| body.inertia[(axis, axis)]).fold(0.0, f64::max);

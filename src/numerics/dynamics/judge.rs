@@ -14,7 +14,7 @@ const DEVIATIONS: f64 = 2.0;
 /// A set that held-out rows have confirmed, and what they did not.
 pub(super) struct JudgedSet {
     pub set: Vec<usize>,
-    /// Of the set: part of the model, but too little to be named.
+    /// What of the set is part of the model, but too little to be named.
     pub silent: Vec<usize>,
     /// With what held-out rows gained by each.
     pub withdrawn: Vec<(usize, f64)>,

@@ -10,11 +10,11 @@ use super::weighted::{Weighing, WeightedColumns};
 const SHIFTS: [f64; 3] = [-0.016, 0.048, 0.004];
 /// s: less is none.
 const LEAST: f64 = 0.002;
-/// Of the whitened squared residual of all joints, per autocorrelation time.
+/// Fall of the whitened squared residual of all joints, per autocorrelation time.
 const GAIN: f64 = 60.0;
 /// The same of one joint, to agree.
 const OWN_GAIN: f64 = 6.0;
-/// Of the joints that must agree.
+/// Share of the joints that must agree.
 const AGREEING: f64 = 0.6;
 
 /// A shift and what it gains.

@@ -82,7 +82,7 @@ pub use recording::TorqueRecording;
 pub use source::TorqueSource;
 pub use types::{
     ContactEvent, EnforcedBodies, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors,
-    TorqueEvidence, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
+    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion,
 };
 
 use crate::error::{Error, Result};

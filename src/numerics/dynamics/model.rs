@@ -49,7 +49,7 @@ pub struct TorqueModel {
     /// All causes that add torque at joints: findings, and of viscous and Coulomb friction the one that is too small to be named beside the
     /// other.
     pub terms: Vec<TorqueTerm>,
-    /// Of identified inertials, of all coefficients, of the numbers of shapes that were found, term after term, and of the width of a
+    /// Covariance of identified inertials, of all coefficients, of the numbers of shapes that were found, term after term, and of the width of a
     /// sign, row-major; with the noise's autocorrelation. Empty where it is not known.
     pub covariance: Vec<f64>,
     /// rad/s over which the sign of a velocity turns.

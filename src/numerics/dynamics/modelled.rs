@@ -14,7 +14,7 @@ pub(super) const COVERAGE: f64 = 1.96;
 const ASKED: usize = 300;
 
 impl TorqueModel {
-    /// Of a judged set.
+    /// The model of a judged set.
     pub(super) fn of(
         choice: &CauseChoice,
         set: &[usize],
@@ -70,7 +70,7 @@ fn rms(problem: &TorqueProblem, own: Vec<(usize, f64)>) -> f64 {
     (acting.into_iter().flatten().map(|value| value * value).sum::<f64>() / count).sqrt()
 }
 
-/// Of each joint, Nm: what held-out rows (fitted ones where none are) leave beyond noise and the covariance of the numbers, one standard
+/// What held-out rows (fitted ones where none are) of each joint leave beyond noise and the covariance of the numbers, Nm, one standard
 /// deviation, and the median of the torque's uncertainty (95 %).
 fn certainty(
     problem: &TorqueProblem,

@@ -5,16 +5,17 @@ use super::choice::CauseChoice;
 use super::findings::plain_finding;
 use super::noise::JointNoise;
 use super::sweep::SweptColumns;
-use super::types::{TorqueFinding, TorqueRival};
+use super::types::TorqueFinding;
+use crate::diagnose::RivalCause;
 use crate::effect::Place;
 use crate::statistics::nearest;
 use std::ops::Range;
 
 /// Standard deviations of the mean square of noise.
 const DEVIATIONS: f64 = 3.0;
-/// Of fitted and of held-out rows over the noise, above which something is left at a joint.
+/// Residual over the noise, of fitted and of held-out rows, above which something is left at a joint.
 const LEFT: f64 = 1.2;
-/// Of two torques: both together are less than this share of either.
+/// Two torques cancel that are together less than this share of either.
 const CANCELLED: f64 = 0.5;
 /// Standard deviations from which on something is shown.
 const SHOWN: f64 = 2.0;
@@ -156,7 +157,7 @@ fn without_name(joint: usize, left: f64, over: f64, mut names: Vec<TorqueFinding
     let mut finding = plain_finding(UNKNOWN, place, statement, Vec::new(), left, 1.0);
     for name in names {
         // Names share what the nameless leaves them.
-        let own = TorqueRival { effect: name.effect, place, delta_bic: 0.0, probability: 0.3 * name.probabilities.name };
+        let own = RivalCause { effect: name.effect, place, delta_bic: 0.0, probability: 0.3 * name.probabilities.name };
         finding.rivals.extend(std::iter::once(own).chain(name.rivals));
         finding.evidence.gain = finding.evidence.gain.max(name.evidence.gain);
         finding.evidence.effect_rms = finding.evidence.effect_rms.max(name.evidence.effect_rms);

@@ -51,7 +51,7 @@ struct Wrench {
 }
 
 impl InverseDynamics {
-    /// Of an arm's axes and points.
+    /// The inverse dynamics by an arm's axes and points.
     pub fn new(arm: &DynamicArm) -> Self {
         let still = LinkMotion {
             rotation: Matrix3::identity(),

@@ -5,7 +5,7 @@ use std::ops::Range;
 /// Rows before that a row remembers, at most.
 const ORDER: usize = 4;
 
-/// Of one joint.
+/// The noise of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointNoise {
     /// Nm, of the course.
@@ -22,7 +22,7 @@ impl JointNoise {
         Self { sigma, innovation: sigma, memory: Vec::new() }
     }
 
-    /// Of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
+    /// The noise of a residual over runs of rows, `spent` of whose freedoms a fit has taken: Yule and Walker's equations by Levinson, the order by
     /// Akaike's criterion.
     pub fn of(residual: &[f64], runs: &[Range<usize>], spent: f64) -> Self {
         let rows: usize = runs.iter().map(Range::len).sum();

@@ -34,7 +34,7 @@ pub(super) struct TorqueProblem<'a> {
     pub latency: f64,
     /// `[joint]`: measured minus rigid torque of judged rows.
     pub measured: Vec<Vec<f64>>,
-    /// Of judged rows.
+    /// Whether each judged row is held out.
     held_out: Vec<bool>,
     pub events: Vec<ContactEvent>,
     pub noise: Vec<JointNoise>,
@@ -43,7 +43,7 @@ pub(super) struct TorqueProblem<'a> {
 }
 
 impl<'a> TorqueProblem<'a> {
-    /// Of a checked recording.
+    /// The problem of a checked recording.
     pub fn new(
         arm: &'a DynamicArm,
         recording: TorqueRecording,
@@ -225,7 +225,7 @@ impl<'a> TorqueProblem<'a> {
         WeightedColumns::new(&self.all, &self.measured, self.weighing(&self.runs(false)), &chosen)
     }
 
-    /// Of some runs under the present noise.
+    /// The weighing of some runs under the present noise.
     pub fn weighing<'b>(&'b self, runs: &'b [Range<usize>]) -> Weighing<'b> {
         Weighing { noise: &self.noise, runs }
     }

@@ -15,7 +15,7 @@ pub struct TorqueRecording {
     pub velocity: Option<Vec<f64>>,
     /// Nm at the joint, rows x n: a torque sensor's, or current times ratio and torque constant.
     pub torque: Vec<f64>,
-    /// Of the gears, K or degrees C; length rows.
+    /// Temperature of the gears, K or degrees C; length rows.
     pub temperature: Option<Vec<f64>>,
     /// Which trajectory a row belongs to, length rows: nothing is filtered from one into the next unless the clock goes on without a gap.
     pub trajectory: Vec<u32>,

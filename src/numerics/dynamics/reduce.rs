@@ -22,7 +22,7 @@ pub(super) struct Reduction {
     pub rate: f64,
     /// Kept rows of the recording, ascending.
     pub rows: Vec<usize>,
-    /// Of the kept rows: runs without a gap.
+    /// Runs of kept rows without a gap.
     pub runs: Vec<Range<usize>>,
     filter: ZeroPhase,
     stretches: Vec<Range<usize>>,
@@ -31,7 +31,7 @@ pub(super) struct Reduction {
 }
 
 impl Reduction {
-    /// Of a clock and a cut-off (Hz).
+    /// The reduction by a clock and a cut-off (Hz).
     pub fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
         let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(recorded.div_ceil(MOST)).max(1);

@@ -17,7 +17,7 @@ pub(super) struct TorqueColumn {
 pub(super) struct ReducedRegressor(Vec<Vec<Vec<f64>>>);
 
 impl ReducedRegressor {
-    /// Of the motion of a recording.
+    /// The regressor of the motion of a recording.
     pub fn of(scene: &DynamicScene, reduction: &Reduction) -> Self {
         let n = scene.joints();
         let mut dynamics = InverseDynamics::new(scene.arm);

@@ -7,7 +7,7 @@ use super::refine::refine_one;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 
-/// Of the strong one's gain: what gains more is a cause of its own.
+/// Share of the strong one's gain: what gains more is a cause of its own.
 const WEAKER: f64 = 0.35;
 /// Rounds, at most.
 const ROUNDS: usize = 6;

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Scale and weights find each other in so many rounds.
 const ROUNDS: usize = 4;
-/// Of the median of absolute values of normal noise.
+/// Standard deviation over the median of absolute values, of normal noise.
 const MEDIAN: f64 = 1.4826;
 
 /// The rich model's forms, and those of `set`.

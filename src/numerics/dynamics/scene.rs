@@ -44,7 +44,7 @@ pub(super) struct DynamicScene<'a> {
 }
 
 impl<'a> DynamicScene<'a> {
-    /// Of a checked recording; the final low-pass will be at `cutoff` (Hz).
+    /// The scene of a checked recording; the final low-pass will be at `cutoff` (Hz).
     pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, clock: &RecordingClock, cutoff: f64, free: bool) -> Self {
         let n = recording.joints;
         let (rows, first) = (recording.rows(), recording.time[0]);

@@ -10,7 +10,7 @@ use super::scene::DynamicScene;
 use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 
-/// Of a shape number: what it is moved by for a difference.
+/// By what share a shape number is moved for a difference.
 const STEP: f64 = 0.03;
 /// Standard deviation of the logarithm of a shape number beforehand: of what the data hardly show, its size is known to a factor of three.
 const BEFOREHAND: f64 = 1.0;
@@ -20,7 +20,7 @@ const BEFOREHAND: f64 = 1.0;
 pub(super) enum ShapeNumber {
     /// Form, and position in its shape.
     Of(usize, usize),
-    /// Of all frictions.
+    /// The width of all frictions' signs.
     SignWidth,
 }
 
@@ -28,7 +28,7 @@ pub(super) enum ShapeNumber {
 pub(super) struct ShapeSlopes(pub Vec<(ShapeNumber, usize)>);
 
 impl ShapeSlopes {
-    /// Of a set at its solution; the columns join those of the problem.
+    /// The slopes of a set at its solution; the columns join those of the problem.
     pub fn of(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &[usize]) -> Self {
         let solution = SweptColumns::base(&problem.all, weighted).with(set).solution();
         let mut slopes = Vec::new();
@@ -66,7 +66,7 @@ impl ShapeSlopes {
     }
 }
 
-/// Of a shape number at its form's coefficients.
+/// The slope by a shape number at its form's coefficients.
 fn shape_slope(problem: &TorqueProblem, number: usize, index: usize, solution: &[(usize, f64)]) -> TorqueColumn {
     let form = &problem.all.forms[number];
     let size = form.shape[index];
@@ -76,7 +76,7 @@ fn shape_slope(problem: &TorqueProblem, number: usize, index: usize, solution: &
     slope
 }
 
-/// Of the width of a sign, over all forms of a set.
+/// The slope by the width of a sign, over all forms of a set.
 fn width_slope(problem: &mut TorqueProblem, set: &[usize], solution: &[(usize, f64)]) -> TorqueColumn {
     let (joints, width) = (problem.joints(), problem.scene.sign_width);
     let rows = problem.reduction.rows.len();
@@ -153,7 +153,7 @@ pub(super) fn planned_slopes(
     slopes
 }
 
-/// Of a function of a shape number.
+/// The slope of a function of a shape number.
 pub(super) fn slope(size: f64, of: impl Fn(f64) -> f64) -> f64 {
     (of(size * (1.0 + STEP)) - of(size * (1.0 - STEP))) / (2.0 * STEP * size)
 }

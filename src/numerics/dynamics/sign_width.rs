@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 const BETTER: f64 = 1e-3;
 /// Steps of the logarithm about the best of the grid: a width that is a little off looks like friction that falls with speed.
 const STEPS: [f64; 4] = [0.35, 0.17, 0.08, 0.04];
-/// Of the scaled inner products.
+/// What is added to the scaled inner products.
 const RIDGE: f64 = 1e-6;
 
 /// The best near one of [`SIGN_WIDTHS`], rad/s.
@@ -65,7 +65,7 @@ struct JointFit {
 }
 
 impl FrictionFit {
-    /// Of the rows that count and the torques as they are at present.
+    /// The fit to the rows that count, by the torques as they are at present.
     pub fn new(problem: &TorqueProblem) -> Self {
         let rows: Vec<usize> = problem.runs(false).iter().flat_map(Clone::clone).collect();
         let velocities = problem.reduction.reduce(problem.scene.velocity.clone());

@@ -33,7 +33,7 @@ pub(super) struct SolvedTorques<'a> {
     pub problem: TorqueProblem<'a>,
     pub weighted: WeightedColumns,
     pub judged: JudgedSet,
-    /// Of the judged set.
+    /// Slopes of the judged set.
     pub slopes: ShapeSlopes,
     pub latency: Option<Latency>,
 }

@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// -2 ln of how common a change is beside none.
 const PRICE: f64 = 6.0;
-/// Of a number's own information: what is known of it beforehand.
+/// What is known of a number beforehand, as a share of its own information.
 const UNKNOWN: f64 = 1e-9;
 
 /// A form that may change: its columns, and whether both recordings have it.
@@ -29,7 +29,7 @@ struct ChangeGroup {
 pub(super) struct StackedNormal {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
-    /// Of the measured torques with themselves.
+    /// Product of the measured torques with themselves.
     square: f64,
     common: usize,
     groups: Vec<ChangeGroup>,
@@ -50,7 +50,7 @@ pub(super) struct StackedFit {
 }
 
 impl StackedNormal {
-    /// Of both problems, whose columns are alike.
+    /// Stacks both problems, whose columns are alike.
     pub fn new(problems: &[TorqueProblem; 2], candidates: &[CandidateColumns]) -> Self {
         let weighted = problems.each_ref().map(|problem| problem.weighted());
         let base = problems[0].all.base;

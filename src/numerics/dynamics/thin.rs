@@ -17,7 +17,7 @@ use std::ops::Range;
 const RATE_OVER_CUTOFF: f64 = 10.0;
 /// The low-pass before thinning, as a share of the rate of kept rows.
 const BAND: f64 = 0.4;
-/// Of the low-pass: rows that it remembers, as a share of rate over cut-off.
+/// Rows that the low-pass remembers, as a share of rate over cut-off.
 const MEMORY: f64 = 20.0;
 /// Rows of a span: a recording that is still too long keeps some spans and leaves out others, evenly.
 const SPAN: usize = 1 << 15;
@@ -27,7 +27,7 @@ const CONTEXT: usize = 4;
 /// Which rows of a long recording are kept.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ThinningPlan {
-    /// Of so many rows one.
+    /// One of so many rows is kept.
     pub every: usize,
     /// Spans of the recording, and how many of them are kept.
     pub spans: [usize; 2],
@@ -54,7 +54,7 @@ impl ThinningPlan {
 pub(super) struct ThinnedRecording {
     pub recording: TorqueRecording,
     pub clock: RecordingClock,
-    /// Of each row: the recorded one.
+    /// The recorded row of each.
     pub origin: Vec<usize>,
     /// Rows that were made up where some were lost.
     pub made_up: usize,
@@ -102,7 +102,7 @@ struct Thinner {
     stretch: TorqueRecording,
     origins: Vec<usize>,
     begun: usize,
-    /// Of the stretch: the next row to keep.
+    /// The next row of the stretch to keep.
     next: usize,
     kept: TorqueRecording,
     origin: Vec<usize>,
@@ -113,7 +113,7 @@ struct Thinner {
 
 impl Thinner {
     fn new(like: &TorqueRecording, pace: ClockPace, plan: ThinningPlan) -> Self {
-        // Of the rate of kept rows, whatever the clock: what the filter does depends on nothing that blocks measure.
+        // Rates are shares of that of kept rows, whatever the clock: what the filter does depends on nothing that blocks measure.
         let rate = plan.every as f64;
         let filter = ZeroPhase::new(rate, if plan.every > 1 { BAND } else { rate });
         let nothing = || TorqueRecording::like(like);

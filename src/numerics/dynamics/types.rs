@@ -1,7 +1,7 @@
 //! What a diagnosis of joint torques is asked, and what it answers.
 
 use super::model::TorqueModel;
-use crate::diagnose::{Probabilities, VerdictKind};
+use crate::diagnose::{Evidence, Probabilities, RivalCause, VerdictKind};
 use crate::effect::Place;
 
 /// How a recording of torques is to be diagnosed.
@@ -16,7 +16,7 @@ pub struct TorqueQuestion {
     pub without: Vec<String>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,
-    /// Of the bootstrap.
+    /// Seed of the bootstrap.
     pub seed: u64,
 }
 
@@ -66,37 +66,6 @@ pub struct TorqueParameter {
     pub sigma: Option<f64>,
 }
 
-/// How well a finding of torques stands.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TorqueEvidence {
-    /// Fall of the whitened squared residual by it beside all others, counted by effective rows.
-    pub gain: f64,
-    /// Of the finding beside all others.
-    pub f_statistic: f64,
-    /// Chance that noise gives as much to this form alone.
-    pub p_value: f64,
-    /// How much worse the criterion is without it.
-    pub delta_bic: f64,
-    /// Fall of the rms of held-out rows over all joints, Nm, when what is left is fitted again (left as it is for wrong masses, for which
-    /// tolerances would bend); `None` where none are held out.
-    pub heldout_gain: Option<f64>,
-    /// Rms of the whole effect over the recording, Nm.
-    pub effect_rms: f64,
-}
-
-/// Another explanation, which these data cannot separate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TorqueRival {
-    /// Name of the cause.
-    pub effect: &'static str,
-    /// Where it acts.
-    pub place: Place,
-    /// How much worse the criterion is with it in place of the finding.
-    pub delta_bic: f64,
-    /// That it is this cause and not the finding's.
-    pub probability: f64,
-}
-
 /// A cause of what the rigid arm leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TorqueFinding {
@@ -109,10 +78,10 @@ pub struct TorqueFinding {
     /// Fitted numbers, in units that people read.
     pub parameters: Vec<TorqueParameter>,
     /// Its weight in the data.
-    pub evidence: TorqueEvidence,
+    pub evidence: Evidence,
     /// Explanations that these data do not exclude, the closest first.
-    pub rivals: Vec<TorqueRival>,
-    /// Of its name and its place.
+    pub rivals: Vec<RivalCause>,
+    /// How probable its name and its place are.
     pub probabilities: Probabilities,
 }
 
@@ -223,7 +192,7 @@ pub struct TorqueDiagnosis {
     pub rate: f64,
     /// Per joint.
     pub noise: Vec<TorqueNoise>,
-    /// Of held-out rows (of the fitted ones where none are held out), of the arm as declared (with identified masses alone where nothing is
+    /// Errors of held-out rows (of the fitted ones where none are held out), of the arm as declared (with identified masses alone where nothing is
     /// declared).
     pub before: TorqueErrors,
     /// The same with the findings.
@@ -244,7 +213,7 @@ pub struct TorqueDiagnosis {
     pub courses: TorqueCourses,
     /// Ten a link.
     pub inertials: Vec<InertialEstimate>,
-    /// Of joints with friction found.
+    /// Curves of joints with friction found.
     pub friction: Vec<FrictionCurve>,
     /// All that was identified, as torques are predicted with it.
     pub model: TorqueModel,

@@ -17,14 +17,14 @@ const MOST: usize = 1 << 17;
 pub(super) struct UsedRecording {
     pub recording: TorqueRecording,
     pub clock: RecordingClock,
-    /// Of each row: the recorded one, or the one before it where it is made up.
+    /// The recorded row of each, or the one before it where it is made up.
     pub origin: Vec<usize>,
     /// What is odd about it, a sentence each.
     pub remarks: Vec<String>,
 }
 
 impl UsedRecording {
-    /// Of a recording whose cut-off will be at so many Hz, or is not known yet. Fails where it cannot be used.
+    /// What is used of a recording whose cut-off will be at so many Hz, or is not known yet. Fails where it cannot be used.
     pub fn of(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>) -> Result<Self> {
         Self::within(arm, source, cutoff, MOST)
     }

@@ -43,14 +43,14 @@ pub(super) struct WeightedColumns {
     pub gram: Vec<Vec<f64>>,
     /// With the measured torque.
     pub right: Vec<f64>,
-    /// Of the measured torque with itself.
+    /// Product of the measured torque with itself.
     pub square: f64,
     /// Rows of a joint.
     pub rows: usize,
 }
 
 impl WeightedColumns {
-    /// Of the columns whose numbers are `chosen`, ascending.
+    /// Products of the columns whose numbers are `chosen`, ascending.
     pub fn new(columns: &TorqueColumns, measured: &[Vec<f64>], weighing: Weighing, chosen: &[usize]) -> Self {
         let count = columns.columns.len();
         let nothing = || TorqueColumn { joints: Vec::new(), courses: Vec::new() };
@@ -135,7 +135,7 @@ impl WeightedColumns {
     }
 }
 
-/// Of two courses of one length.
+/// Product of two courses of one length.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums at once: one would wait for itself.
     let mut sums = [0.0; 4];

@@ -3,7 +3,7 @@
 //! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
 //! centre and `radius`.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::{Anchor, RobotModel, Shape};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -29,20 +29,14 @@ impl AnchorShift {
 }
 
 impl Cause for AnchorShift {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::ANCHOR,
-            place: "anchor",
-            formula: "what is measured from is elsewhere: the end of a draw-wire or ballbar, a socket, a plane, a sphere; it moves no point",
-            size: "any",
-            confounded: "base_frame",
-            needs: "distances, sockets, planes or spheres",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+    about! {
+        name: names::ANCHOR,
+        place: "anchor",
+        formula: "what is measured from is elsewhere: the end of a draw-wire or ballbar, a socket, a plane, a sphere; it moves no point",
+        size: "any",
+        confounded: "base_frame",
+        needs: "distances, sockets, planes or spheres",
+        arm_effect: Some(|_| Box::new(AnchorShift)),
     }
 }
 

@@ -2,8 +2,8 @@
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::{
-    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
-    Variable, names,
+    Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term, Variable, about,
+    names,
 };
 use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
@@ -16,17 +16,14 @@ pub struct AxisWobble;
 const LARGEST: f64 = 5e-4;
 
 impl Cause for AxisWobble {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::AXIS_WOBBLE,
-            place: "joint",
-            formula: "the axis tilts by sin(n q), cos(n q), n = 1, 2",
-            size: "5 to 100 arcsec",
-            confounded: "gear_cyclic of a neighbour, coupling_ratio",
-            needs: "points far off the axis",
-            measure: Some(Measure { rank: 6, advice: "measure a second target off the first" }),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::AXIS_WOBBLE,
+        place: "joint",
+        formula: "the axis tilts by sin(n q), cos(n q), n = 1, 2",
+        size: "5 to 100 arcsec",
+        confounded: "gear_cyclic of a neighbour, coupling_ratio",
+        needs: "points far off the axis",
+        measure: Some(Measure { rank: 6, advice: "measure a second target off the first" }),
     }
 
     /// Every joint but the last, whose tilt one measured point cannot separate from its angle.

@@ -1,9 +1,7 @@
 //! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
 
 use super::basis::around;
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
-};
+use super::{Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names};
 use crate::criteria::effect::{BENDS, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -35,18 +33,15 @@ fn known(joint: usize, survey: &Survey) -> Option<f64> {
 }
 
 impl Cause for Backlash {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::BACKLASH,
-            place: "joint",
-            formula: "d = g s, or g sign(t), or the one at small and the other at large loads",
-            size: "5 to 100 arcsec",
-            confounded: "joint_hardening, joint_log_lag",
-            needs: "both directions of approach",
-            measure: Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" }),
-            absorbs_residual: &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::BACKLASH,
+        place: "joint",
+        formula: "d = g s, or g sign(t), or the one at small and the other at large loads",
+        size: "5 to 100 arcsec",
+        confounded: "joint_hardening, joint_log_lag",
+        needs: "both directions of approach",
+        measure: Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" }),
+        absorbs_residual: &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -1,9 +1,7 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::placed;
-use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
-};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -27,16 +25,14 @@ const STEP: f64 = 0.3;
 const DEEPEST: f64 = 3.0;
 
 impl Cause for BaseCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "base_compliance",
-            place: "base",
-            formula: "the base tilts about its origin, or a point below, by the moment on it",
-            size: "0.01 to 1 urad/Nm",
-            confounded: "joint_compliance of joint 2, link_compliance of link 1",
-            needs: "link masses",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "base_compliance",
+        place: "base",
+        formula: "the base tilts about its origin, or a point below, by the moment on it",
+        size: "0.01 to 1 urad/Nm",
+        confounded: "joint_compliance of joint 2, link_compliance of link 1",
+        needs: "link masses",
+        read: Some(Form::kept::<TiltingBase>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -47,10 +43,6 @@ impl Cause for BaseCompliance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the base tilts under the arm's weight by {}", summary.value())
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(TiltingBase::deserialize(body).map(Form::from))
     }
 }
 

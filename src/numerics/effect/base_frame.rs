@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
@@ -41,20 +41,14 @@ impl BasePlacement {
 }
 
 impl Cause for BaseFrame {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::BASE_FRAME,
-            place: "base",
-            formula: "a rigid motion of the base",
-            size: "any",
-            confounded: "tool_offset, joint_offset of the first joint",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(BasePlacement { start: setting.base }))
+    about! {
+        name: names::BASE_FRAME,
+        place: "base",
+        formula: "a rigid motion of the base",
+        size: "any",
+        confounded: "tool_offset, joint_offset of the first joint",
+        needs: "-",
+        arm_effect: Some(|setting| Box::new(BasePlacement { start: setting.base })),
     }
 }
 

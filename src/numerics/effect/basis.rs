@@ -98,7 +98,7 @@ pub enum Basis {
         start: f64,
         /// Where it is one.
         end: f64,
-        /// Of the power.
+        /// Exponent of the power.
         exponent: f64,
     },
     /// The same from `start` on; 1 later than `CREEPING` times the way.
@@ -107,7 +107,7 @@ pub enum Basis {
         start: f64,
         /// Where it is one.
         end: f64,
-        /// Of the power.
+        /// Exponent of the power.
         exponent: f64,
     },
     /// 1 - exp(-(u - start) / constant) from `start` on.

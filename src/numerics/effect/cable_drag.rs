@@ -3,24 +3,22 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, CauseDescription, Form, Hypothesis, Summary, Survey, names};
+use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
 
 impl Cause for CableDrag {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::CABLE_DRAG,
-            place: "joint",
-            formula: "t by the angles of the joint and its neighbour",
-            size: "1 to 10 % of the joint's torque",
-            confounded: "unknown, gear_cyclic of order 1",
-            needs: "motor currents",
-            measure: Some(MEASURE),
-            absorbs_residual: FINER,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::CABLE_DRAG,
+        place: "joint",
+        formula: "t by the angles of the joint and its neighbour",
+        size: "1 to 10 % of the joint's torque",
+        confounded: "unknown, gear_cyclic of order 1",
+        needs: "motor currents",
+        measure: Some(MEASURE),
+        absorbs_residual: FINER,
+        read: Some(|body| Spring::read(&CableDrag, body)),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -35,9 +33,5 @@ impl Cause for CableDrag {
                 "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
             ),
         }
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Spring::read(&Self, body))
     }
 }

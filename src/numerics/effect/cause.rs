@@ -4,7 +4,7 @@ use super::*;
 use crate::criteria::words::REFINEMENT;
 
 /// What a cause is: in words, and in what diagnosis asks of every cause.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct CauseDescription {
     /// Canonical name.
     pub name: &'static str,
@@ -29,6 +29,10 @@ pub struct CauseDescription {
     pub absorbs_residual: &'static [&'static str],
     /// What separates it from others beside more poses.
     pub measure: Option<Measure>,
+    /// The effect of the whole arm, for causes that are identified, not searched for.
+    pub arm_effect: Option<ArmEffectOf>,
+    /// Reads its forms, where they are no [`Term`], as [`Placed::body`] wrote them.
+    pub read: Option<fn(&serde_json::Value) -> serde_json::Result<Form>>,
 }
 
 impl CauseDescription {
@@ -45,8 +49,24 @@ impl CauseDescription {
         prior_sigma: None,
         absorbs_residual: &[],
         measure: None,
+        arm_effect: None,
+        read: None,
     };
 }
+
+/// Writes what a cause is, [`Cause::about`](crate::effect::Cause::about): `about! { name: "backlash", place: "joint" }`. What it does not say is
+/// as of most causes, [`CauseDescription::PLAIN`](crate::effect::CauseDescription::PLAIN).
+#[macro_export]
+macro_rules! about {
+    ($($field:ident: $value:expr),+ $(,)?) => {
+        fn about(&self) -> &'static $crate::effect::CauseDescription {
+            &$crate::effect::CauseDescription { $($field: $value,)+ ..$crate::effect::CauseDescription::PLAIN }
+        }
+    };
+}
+
+/// The effect of the whole arm in a setting.
+pub type ArmEffectOf = fn(&EffectContext) -> Box<dyn Effect>;
 
 /// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,9 +90,9 @@ pub trait Cause: Sync {
         self.about().name
     }
 
-    /// The effect of the whole arm, for causes that are identified, not searched for.
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        None
+    /// See [`CauseDescription::arm_effect`].
+    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+        self.about().arm_effect.map(|make| make(setting))
     }
 
     /// Every hypothesis that the recording can speak of.
@@ -135,24 +155,22 @@ pub trait Cause: Sync {
         Vec::new()
     }
 
-    /// Reads a form that is no [`Term`], as [`Placed::body`] wrote it.
-    fn read(&self, _body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        None
+    /// The coefficients of a term of this cause; those of a frame's motion unless it says others.
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        term.motion().frame_numbers(str::to_string)
     }
 
-    /// The coefficients of a term of this cause.
-    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        Vec::new()
+    /// See [`Placed::near`]; laws that step, settle or lag have the same neighbours whatever their cause.
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        match term.basis() {
+            Basis::After { .. } => change::near(term, survey),
+            _ => warmth::near(term, survey, level),
+        }
     }
 
-    /// See [`Placed::near`].
-    fn near(&self, _term: &Term, _survey: &Survey, _level: i32) -> Vec<Term> {
-        Vec::new()
-    }
-
-    /// See [`Placed::variant`].
-    fn variant(&self, _term: &Term) -> String {
-        String::new()
+    /// See [`Placed::variant`]; that of a wave is its order.
+    fn variant(&self, term: &Term) -> String {
+        orders::variant(term)
     }
 
     /// Why a term with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the
@@ -216,7 +234,7 @@ pub fn cause(name: &str) -> Option<&'static dyn Cause> {
 }
 
 /// The effect of the whole arm of a name, if there is one.
-pub fn whole(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+pub fn arm_effect(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
     cause(name)?.arm_effect(setting)
 }
 

@@ -21,7 +21,7 @@ pub(super) fn propose(cause: &'static dyn Cause, motions: &[Motion], survey: &Su
 /// The same at neighbouring change points.
 pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
     let Basis::After { at } = term.basis() else { return Vec::new() };
-    let others = survey.changes_near(at).into_iter().filter(|other| *other != at).map(|at| Basis::After { at });
+    let others = survey.changes_near(at).iter().copied().filter(|other| *other != at).map(|at| Basis::After { at });
     term.with_bases(others).into_iter().filter(|term| is_its_own(term, survey)).collect()
 }
 

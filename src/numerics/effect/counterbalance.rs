@@ -3,23 +3,21 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{Cause, CauseDescription, Form, Hypothesis, Summary, Survey, names};
+use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
 pub struct Counterbalance;
 
 impl Cause for Counterbalance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::COUNTERBALANCE,
-            place: "joint 2 or 3",
-            formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
-            size: "10 to 60 % of the gravity torque",
-            confounded: "gear_cyclic of order 1, link_mass",
-            needs: "link masses and motor currents",
-            measure: Some(MEASURE),
-            absorbs_residual: FINER,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::COUNTERBALANCE,
+        place: "joint 2 or 3",
+        formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
+        size: "10 to 60 % of the gravity torque",
+        confounded: "gear_cyclic of order 1, link_mass",
+        needs: "link masses and motor currents",
+        measure: Some(MEASURE),
+        absorbs_residual: FINER,
+        read: Some(|body| Spring::read(&Counterbalance, body)),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -28,9 +26,5 @@ impl Cause for Counterbalance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Spring::read(&Self, body))
     }
 }

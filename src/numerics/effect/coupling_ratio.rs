@@ -3,8 +3,8 @@
 //! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Hypothesis, Law, Motion, NumberSpec, ParameterSpec,
-    Place, Summary, Survey, Term, Variable, figure, names,
+    ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Summary, Survey, Term,
+    Variable, about, figure, names,
 };
 use crate::criteria::effect::RARER;
 use crate::robot::{Measurements, RobotModel};
@@ -13,20 +13,14 @@ use crate::units::Unit;
 pub struct CouplingRatio;
 
 impl Cause for CouplingRatio {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::COUPLING_RATIO,
-            place: "joint A->B",
-            formula: "d of B = c q of A",
-            size: "1e-5 to 1e-2",
-            confounded: "axis_wobble, link_geometry",
-            needs: "a wide travel of joint A",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(DeclaredCouplings))
+    about! {
+        name: names::COUPLING_RATIO,
+        place: "joint A->B",
+        formula: "d of B = c q of A",
+        size: "1e-5 to 1e-2",
+        confounded: "axis_wobble, link_geometry",
+        needs: "a wide travel of joint A",
+        arm_effect: Some(|_| Box::new(DeclaredCouplings)),
     }
 
     /// Every pair that the robot file does not declare.

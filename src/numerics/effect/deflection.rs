@@ -12,13 +12,13 @@ pub enum Direction {
     Station(usize, Twist),
     /// On the load of a joint (from 0): Nm per unit of the parameter; it acts through the joint's compliance.
     Torque(usize, f64),
-    /// Of the row's anchor, tracker frame, m per unit.
+    /// Motion of the row's anchor, tracker frame, m per unit.
     Anchor(Vector3<f64>),
-    /// Of the normal of the row's plane, which is the first vector: its change, the second, per unit.
+    /// Turn of the row's plane: its normal, and the change of that per unit.
     AnchorTilt(Vector3<f64>, Vector3<f64>),
-    /// Of the radius of the row's sphere, m per unit.
+    /// Growth of the radius of the row's sphere, m per unit.
     AnchorGrowth(f64),
-    /// Of the point as the instrument reads it, tracker frame, m per unit.
+    /// Change of the point as the instrument reads it, tracker frame, m per unit.
     Instrument(Vector3<f64>),
 }
 

@@ -7,7 +7,7 @@ use super::{
     Variable, cause,
 };
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
-use serde::de::Error as _;
+use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub trait Placed: Send + Sync {
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec>;
     /// See [`Effect::deflect`].
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
-    /// Its place and shape as JSON, as [`Cause::read`] reads it: what tells it from others of its cause.
+    /// Its place and shape as JSON, as [`CauseDescription::read`](super::CauseDescription::read) reads it: what tells it from others of its cause.
     fn body(&self) -> serde_json::Value;
     /// See [`Effect::needs_torque`].
     fn needs_torque(&self) -> bool {
@@ -50,7 +50,7 @@ pub trait Placed: Send + Sync {
     fn near(&self, _survey: &Survey, _level: i32) -> Vec<Form> {
         Vec::new()
     }
-    /// Of forms with one effect, place and variant only one is in a set; others may stand together, e.g. two orders of a gear.
+    /// What tells forms of one effect and place apart that may stand together in a set, e.g. two orders of a gear; of one variant only one does.
     fn variant(&self) -> String {
         String::new()
     }
@@ -189,6 +189,11 @@ impl Form {
         self.numbers(robot).into_iter().map(spec).collect()
     }
 
+    /// Reads a form that keeps all that it is in its body.
+    pub(super) fn kept<T: Placed + DeserializeOwned + 'static>(body: &serde_json::Value) -> serde_json::Result<Self> {
+        T::deserialize(body).map(Self::from)
+    }
+
     /// Effect, place and variant: see [`Placed::variant`].
     pub fn key(&self) -> String {
         format!("{}@{}#{}", self.name(), self.place(), self.variant())
@@ -219,7 +224,7 @@ impl<'de> Deserialize<'de> for Form {
         let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
         let [(name, body)] = <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
         let form = match cause(&name) {
-            Some(cause) => cause.read(&body).unwrap_or_else(|| Term::read(cause, body)),
+            Some(cause) => cause.about().read.map_or_else(|| Term::read(cause, body.clone()), |read| read(&body)),
             None => DeclaredForm::read(&name, body),
         };
         form.map_err(D::Error::custom)

@@ -3,8 +3,8 @@
 use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable, names, orders,
+    Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about, names,
+    orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
 use crate::robot::RobotModel;
@@ -26,18 +26,15 @@ impl GearCyclic {
 }
 
 impl Cause for GearCyclic {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::GEAR_CYCLIC,
-            place: "joint",
-            formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",
-            size: "5 to 100 arcsec",
-            confounded: "counterbalance at n = 1, axis_wobble",
-            needs: "enough points a period",
-            absorbs_residual: &[names::UNKNOWN],
-            prior_sigma: Some(orders::LARGE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::GEAR_CYCLIC,
+        place: "joint",
+        formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",
+        size: "5 to 100 arcsec",
+        confounded: "counterbalance at n = 1, axis_wobble",
+        needs: "enough points a period",
+        absorbs_residual: &[names::UNKNOWN],
+        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -1,8 +1,6 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
-};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,44 +9,26 @@ pub struct GearFlank;
 /// Orders per joint turn that are tried: grinding errors are of few periods a turn.
 const ORDERS: u32 = 24;
 
-impl GearFlank {
-    fn term(joint: usize, order: u32) -> Term {
-        let law = orders::wave(Variable::Angle { joint }, order).times(Variable::Approach { joint }, Basis::PROPORTIONAL);
-        Term::new(&Self, Motion::Joint { joint }, law)
-    }
-}
-
 impl Cause for GearFlank {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "gear_flank",
-            place: "joint",
-            formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",
-            size: "2 to 40 arcsec",
-            confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
-            needs: "both directions of approach over the joint's range",
-            measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
-            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-            prior_sigma: Some(orders::LARGE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "gear_flank",
+        place: "joint",
+        formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",
+        size: "2 to 40 arcsec",
+        confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
+        needs: "both directions of approach over the joint's range",
+        measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
+        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.both_directions(*joint));
-        let terms = joints.flat_map(|joint| {
-            let orders = orders::within_travel(survey, joint, ORDERS);
-            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize))
-        });
-        terms.collect()
+        orders::followed(&Self, survey, joints, ORDERS, |joint| Variable::Approach { joint })
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         orders::numbers(Unit::Radian, 0.01)
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

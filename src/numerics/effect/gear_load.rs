@@ -1,8 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, names, orders,
-};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -12,46 +10,29 @@ pub struct GearLoad;
 /// Orders per joint turn that are tried.
 const ORDERS: u32 = 24;
 
-impl GearLoad {
-    fn term(joint: usize, order: u32) -> Term {
-        let law = orders::wave(Variable::Angle { joint }, order).times(Variable::Load { joint }, Basis::PROPORTIONAL);
-        Term::new(&Self, Motion::Joint { joint }, law)
-    }
-}
-
 impl Cause for GearLoad {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "gear_load",
-            place: "joint",
-            formula: "d = t (a sin(n q) + b cos(n q)), n = 1 .. 24",
-            size: "2 to 40 arcsec under full load",
-            confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
-            needs: "link masses, loads that change at the same angle",
-            measure: Some(Measure {
-                rank: 5,
-                advice: "repeat poses with and without a payload over the whole range of the joint",
-            }),
-            absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "gear_load",
+        place: "joint",
+        formula: "d = t (a sin(n q) + b cos(n q)), n = 1 .. 24",
+        size: "2 to 40 arcsec under full load",
+        confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
+        needs: "link masses, loads that change at the same angle",
+        measure: Some(Measure {
+            rank: 5,
+            advice: "repeat poses with and without a payload over the whole range of the joint",
+        }),
+        absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let terms = joints.flat_map(|joint| {
-            let orders = orders::within_travel(survey, joint, ORDERS);
-            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(*RARE))
-        });
-        terms.collect()
+        let all = orders::followed(&Self, survey, joints, ORDERS, |joint| Variable::Load { joint });
+        all.into_iter().map(|hypothesis| hypothesis.penalised(*RARE)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         orders::numbers(Unit::RadianPerNewtonMetre, 1e-4)
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -1,7 +1,7 @@
 //! `gear_motor_cyclic`: error periodic in the motor angle (joint angle times reduction ratio), e.g. of the input stage.
 
 use super::summary::amplitude;
-use super::{Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
+use super::{Cause, Hypothesis, Motion, NumberSpec, Summary, Survey, Term, Variable, about, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,17 +11,14 @@ pub struct GearMotorCyclic;
 const ORDERS: u32 = 2;
 
 impl Cause for GearMotorCyclic {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "gear_motor_cyclic",
-            place: "joint",
-            formula: "d = a sin(n i q) + b cos(n i q), i the reduction ratio, n = 1, 2",
-            size: "2 to 30 arcsec",
-            confounded: "noise: nothing else is as fast",
-            needs: "reduction ratios in the robot file",
-            prior_sigma: Some(orders::LARGE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "gear_motor_cyclic",
+        place: "joint",
+        formula: "d = a sin(n i q) + b cos(n i q), i the reduction ratio, n = 1, 2",
+        size: "2 to 30 arcsec",
+        confounded: "noise: nothing else is as fast",
+        needs: "reduction ratios in the robot file",
+        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -34,10 +31,6 @@ impl Cause for GearMotorCyclic {
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         orders::numbers(Unit::Radian, 0.01)
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

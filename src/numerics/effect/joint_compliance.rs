@@ -6,8 +6,8 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, ParameterSpec,
-    Place, Placed, Summary, Survey, Variable, names,
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, NumberSpec, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, about, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -16,21 +16,16 @@ use serde::{Deserialize, Serialize};
 pub struct JointCompliance;
 
 impl Cause for JointCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_COMPLIANCE,
-            place: "joint",
-            formula: "d = c t",
-            size: "0.1 to 10 urad/Nm",
-            confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
-            needs: "link masses, motor currents, or many postures",
-            absorbs_residual: &[names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Windups(setting.load)))
+    about! {
+        name: names::JOINT_COMPLIANCE,
+        place: "joint",
+        formula: "d = c t",
+        size: "0.1 to 10 urad/Nm",
+        confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
+        needs: "link masses, motor currents, or many postures",
+        absorbs_residual: &[names::UNKNOWN],
+        arm_effect: Some(|setting| Box::new(Windups(setting.load))),
+        read: Some(|body| UnweighedWindup::read(&JointCompliance, body).unwrap_or_else(|| Form::kept::<Windup>(body))),
     }
 
     /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
@@ -63,16 +58,12 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        UnweighedWindup::read(&Self, body).or_else(|| Some(Windup::deserialize(body).map(Form::from)))
-    }
-
     fn yields_to_torque(&self) -> bool {
         true
     }
 }
 
-/// Of one joint.
+/// The wind-up of one joint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Windup {
     load: Load,
@@ -135,7 +126,7 @@ impl Windup {
     }
 }
 
-/// Of every joint that turns.
+/// The wind-ups of every joint that turns.
 struct Windups(Load);
 
 impl Windups {

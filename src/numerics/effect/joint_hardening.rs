@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place,
-    Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place, Placed, Summary,
+    Survey, Variable, about, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -51,21 +51,19 @@ const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
 
 impl Cause for JointHardening {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_HARDENING,
-            place: "joint",
-            formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
-            size: "5 to 50 % of the wind-up",
-            confounded: "joint_compliance, backlash",
-            needs: "link masses and two payloads",
-            measure: Some(Measure {
-                rank: 7,
-                advice: "measure with a third payload between none and full, and with joints near their largest load",
-            }),
-            absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_HARDENING,
+        place: "joint",
+        formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
+        size: "5 to 50 % of the wind-up",
+        confounded: "joint_compliance, backlash",
+        needs: "link masses and two payloads",
+        measure: Some(Measure {
+            rank: 7,
+            advice: "measure with a third payload between none and full, and with joints near their largest load",
+        }),
+        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
+        read: Some(Form::kept::<BentWindup>),
     }
 
     /// Every loaded joint with several laws each.
@@ -100,11 +98,6 @@ impl Cause for JointHardening {
 
     fn simpler(&self) -> Option<&'static str> {
         Some(names::JOINT_COMPLIANCE)
-    }
-
-    /// From a wind-up in proportion.
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(BentWindup::deserialize(body).map(Form::from))
     }
 
     fn yields_to_torque(&self) -> bool {

@@ -3,8 +3,8 @@
 
 use super::form::placed;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary,
-    Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    about, figure, names,
 };
 use crate::criteria::words::{CLOCKS, TRACE};
 use crate::robot::RobotModel;
@@ -39,18 +39,16 @@ pub struct Lag {
 const LARGEST: f64 = 0.3;
 
 impl Cause for JointLogLag {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_LOG_LAG,
-            place: "recording",
-            formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
-            size: "0.1 to 5 % of the move; 0.5 to 20 ms",
-            confounded: "backlash; viscous_windup where one joint moves alone",
-            needs: "rows in the order of measurement; joint velocities",
-            of_the_measurement: true,
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_LOG_LAG,
+        place: "recording",
+        formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
+        size: "0.1 to 5 % of the move; 0.5 to 20 ms",
+        confounded: "backlash; viscous_windup where one joint moves alone",
+        needs: "rows in the order of measurement; joint velocities",
+        of_the_measurement: true,
+        separable_by_poses: false,
+        read: Some(Form::kept::<Lag>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -104,10 +102,6 @@ impl Cause for JointLogLag {
     fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
         let clocks = form.variables() == [Variable::Speed];
         clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Lag::deserialize(body).map(Form::from))
     }
 }
 

@@ -1,6 +1,6 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -8,20 +8,14 @@ use crate::units::Unit;
 pub struct JointOffset;
 
 impl Cause for JointOffset {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_OFFSET,
-            place: "joint",
-            formula: "d = c",
-            size: "0.1 to 5 mrad",
-            confounded: "base_frame, link_geometry",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+    about! {
+        name: names::JOINT_OFFSET,
+        place: "joint",
+        formula: "d = c",
+        size: "0.1 to 5 mrad",
+        confounded: "base_frame, link_geometry",
+        needs: "-",
+        arm_effect: Some(|_| Box::new(JointOffset)),
     }
 }
 

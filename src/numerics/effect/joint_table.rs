@@ -1,8 +1,7 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
 use super::{
-    Basis, Cause, CauseDescription, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term,
-    Variable, names,
+    Basis, Cause, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable, about, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -32,17 +31,14 @@ impl Cause for JointTable {
         true
     }
 
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_TABLE,
-            place: "joint",
-            formula: "d = a smooth curve of q over the measured range",
-            size: "5 to 200 arcsec",
-            confounded: "gear_cyclic",
-            needs: "many points",
-            absorbs_residual: &[names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_TABLE,
+        place: "joint",
+        formula: "d = a smooth curve of q over the measured range",
+        size: "5 to 200 arcsec",
+        confounded: "gear_cyclic",
+        needs: "many points",
+        absorbs_residual: &[names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -1,8 +1,6 @@
 //! `joint_warming`: a joint's zero, ratio or stiffness follows a temperature, the warm-up, or the heat of the joint's own work.
 
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names, warmth,
-};
+use super::{Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names, warmth};
 use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
 use crate::units::Unit;
@@ -29,19 +27,16 @@ fn work(joint: usize, survey: &Survey) -> Vec<(Law, usize)> {
 }
 
 impl Cause for JointWarming {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::JOINT_WARMING,
-            place: "joint",
-            formula: "d = w, w q or w t, w: temperature above the first, warm-up, or recent work",
-            size: "1 to 50 arcsec",
-            confounded: "tracker_drift and base_shift (joint 1), thermal_growth",
-            needs: "temperature or time",
-            measure: Some(super::thermal_growth::MEASURE),
-            absorbs_residual: &[names::UNKNOWN],
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::JOINT_WARMING,
+        place: "joint",
+        formula: "d = w, w q or w t, w: temperature above the first, warm-up, or recent work",
+        size: "1 to 50 arcsec",
+        confounded: "tracker_drift and base_shift (joint 1), thermal_growth",
+        needs: "temperature or time",
+        measure: Some(super::thermal_growth::MEASURE),
+        absorbs_residual: &[names::UNKNOWN],
+        separable_by_poses: false,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -74,10 +69,6 @@ impl Cause for JointWarming {
             Some(_) => (Unit::RadianPerNewtonMetre, 1e-4),
         };
         vec![(when.into(), unit, sigma)]
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
     }
 
     fn variant(&self, term: &Term) -> String {

@@ -1,6 +1,6 @@
 //! Laws: a basis of a variable, or the product of two.
 
-use super::{ArmState, Basis, LONG_AFTER, Variable};
+use super::{ArmState, Basis, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ const FURTHER: f64 = 0.5;
 /// Functions of one variable; the same whatever the rows that they were fitted to.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
-    /// Of what.
+    /// What they are functions of.
     pub of: Variable,
     /// Which functions of it.
     pub basis: Basis,
@@ -42,7 +42,7 @@ impl Factor {
     /// not to a time that nobody states: what was seen last is the best that is known of that.
     fn held(&self, u: f64) -> f64 {
         let Some([low, high]) = self.within else { return u };
-        let ends = self.basis.is_curve() || (self.of == Variable::Time && u >= LONG_AFTER);
+        let ends = self.basis.is_curve() || u.is_infinite();
         let further = if ends { 0.0 } else { FURTHER * (high - low) };
         u.clamp(low - further, high + further)
     }
@@ -70,7 +70,10 @@ impl Factor {
         for component in 0..self.of.components() {
             if let Some(u) = self.of.value(component, robot, state) {
                 let u = self.held(u);
-                self.basis.at(u, &mut |k, value| each(component * self.basis.count() + k, value));
+                // Long after the recording a function without a limit counts for nothing.
+                let mut counted =
+                    |k: usize, value: f64| each(component * self.basis.count() + k, if value.is_finite() { value } else { 0.0 });
+                self.basis.at(u, &mut counted);
             }
         }
     }
@@ -177,6 +180,7 @@ links:
             payload: vec![payload],
             temperature: Some(vec![temperature]),
             time: Some(vec![time]),
+            long_after: time.is_infinite(),
             ..Measurements::default()
         };
         let posture = Posture::as_stated(&robot, data.q(0), payload);
@@ -224,6 +228,11 @@ links:
         assert!((share(Basis::Settling { start: 0.0, constant: 200.0 }) - (-5.0f64).exp()).abs() < 1e-12);
         assert!(share(Basis::Settling { start: 0.0, constant: 2000.0 }) > 0.6);
         let drift = Factor::new(Variable::Time, Basis::PROPORTIONAL).held_within([0.0, 1000.0]);
-        assert_eq!(at(&drift, 0.0, [0.0, 0.0, LONG_AFTER]), (at(&drift, 0.0, [0.0, 0.0, 1000.0]).0, 1.0));
+        let long_after = |factor: &Factor| at(factor, 0.0, [0.0, 0.0, f64::INFINITY]);
+        assert_eq!(long_after(&drift), (at(&drift, 0.0, [0.0, 0.0, 1000.0]).0, 1.0));
+        let limit = |basis: Basis| long_after(&Factor::new(Variable::Time, basis)).0;
+        assert_eq!(limit(Basis::After { at: 500.0 }), 1.0);
+        assert_eq!(limit(Basis::Settling { start: 0.0, constant: 200.0 }), 1.0);
+        assert_eq!(limit(Basis::PROPORTIONAL), 0.0, "without a limit");
     }
 }

@@ -2,9 +2,7 @@
 
 use super::form::placed;
 use super::motion::{SHORT, extent};
-use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
-};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
 use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -38,16 +36,14 @@ pub struct BentLink {
 const WRIST: usize = 2;
 
 impl Cause for LinkCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::LINK_COMPLIANCE,
-            place: "link",
-            formula: "the link bends about its far joint, by the moment there",
-            size: "0.05 to 1 urad/Nm",
-            confounded: "joint_compliance of either end",
-            needs: "link masses",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::LINK_COMPLIANCE,
+        place: "link",
+        formula: "the link bends about its far joint, by the moment there",
+        size: "0.05 to 1 urad/Nm",
+        confounded: "joint_compliance of either end",
+        needs: "link masses",
+        read: Some(Form::kept::<BentLink>),
     }
 
     /// Every link that something hangs on.
@@ -70,10 +66,6 @@ impl Cause for LinkCompliance {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} bends under what it carries by {}", summary.place, summary.value())
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(BentLink::deserialize(body).map(Form::from))
     }
 }
 

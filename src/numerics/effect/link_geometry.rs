@@ -3,7 +3,7 @@
 //! Two displacements and two tilts perpendicular to the axis of joint N+1, about its point; together with `base_frame`,
 //! `joint_offset` and `tool_offset` this is complete (rank 4R + 2P + 3) and free of the singularity of parallel axes.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -19,20 +19,14 @@ fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, b
 }
 
 impl Cause for LinkGeometry {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::LINK_GEOMETRY,
-            place: "link",
-            formula: "lengths and tilts between two axes",
-            size: "0.1 to 1 mm, 0.1 to 1 mrad",
-            confounded: "joint_offset, tool_offset",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+    about! {
+        name: names::LINK_GEOMETRY,
+        place: "link",
+        formula: "lengths and tilts between two axes",
+        size: "0.1 to 1 mm, 0.1 to 1 mrad",
+        confounded: "joint_offset, tool_offset",
+        needs: "-",
+        arm_effect: Some(|_| Box::new(LinkGeometry)),
     }
 }
 

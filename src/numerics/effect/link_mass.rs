@@ -2,9 +2,7 @@
 
 use super::form::placed;
 use super::spring::{MEASURE, Spring};
-use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, names,
-};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -22,17 +20,15 @@ pub struct WrongLinkMass {
 }
 
 impl Cause for LinkMass {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::LINK_MASS,
-            place: "link",
-            formula: "mass and first moments of a link in the torque model",
-            size: "3 to 20 %",
-            confounded: "counterbalance, payload_error",
-            needs: "link masses and motor currents",
-            measure: Some(MEASURE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::LINK_MASS,
+        place: "link",
+        formula: "mass and first moments of a link in the torque model",
+        size: "3 to 20 %",
+        confounded: "counterbalance, payload_error",
+        needs: "link masses and motor currents",
+        measure: Some(MEASURE),
+        read: Some(Form::kept::<WrongLinkMass>),
     }
 
     /// Every link carried by a joint that yields in the present model.
@@ -47,10 +43,6 @@ impl Cause for LinkMass {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(WrongLinkMass::deserialize(body).map(Form::from))
     }
 }
 

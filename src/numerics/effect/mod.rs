@@ -74,13 +74,14 @@ mod words;
 mod wrong_point;
 mod zero_shift;
 
+pub use crate::about;
 pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
 pub use basis::{Basis, Gaps, Knots};
 pub use cable_drag::CableDrag;
-pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
+pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, arm_effect, cause, hypotheses, identified};
 pub use change::moved_with_the_payload;
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
 pub use deflection::{Deflection, Direction};
@@ -113,7 +114,7 @@ pub use volume::Closing;
 pub use words::{Clock, figure};
 pub use zero_shift::ZeroShift;
 
-use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel, RowTime};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -131,9 +132,6 @@ pub struct ParameterSpec {
     /// One sigma of what is known before any measurement, SI; wide.
     pub prior_sigma: f64,
 }
-
-/// s; later than anything recorded, so that steps have happened and the arm is warm.
-pub const LONG_AFTER: f64 = 1e9;
 
 /// The circumstances of one row that effects may depend on.
 #[derive(Debug, Clone, Copy)]
@@ -183,9 +181,12 @@ impl<'a> ArmState<'a> {
         self.data.current(self.row)
     }
 
-    /// s; the number of the row where the recording has no clock.
+    /// s, or the number of the row where the recording has no clock; infinite long after the recording, where laws take their limit.
     pub fn time(&self) -> f64 {
-        self.data.time(self.row)
+        match self.data.row_time(self.row) {
+            RowTime::At(time) => time,
+            RowTime::LongAfter => f64::INFINITY,
+        }
     }
 
     /// C, where recorded.

@@ -1,7 +1,7 @@
 //! Errors of whole periods a turn: what the causes that err by a sine and a cosine of an angle have in common.
 
 use super::summary::amplitude;
-use super::{Basis, Law, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::units::Unit;
 
 /// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
@@ -20,6 +20,21 @@ pub(super) fn wave(of: Variable, order: u32) -> Law {
 pub(super) fn within_travel(survey: &Survey, joint: usize, most: u32) -> impl Iterator<Item = u32> + use<> {
     let travel = survey.travel(joint);
     (1..=most).filter(move |order| f64::from(*order) * travel > PHASE)
+}
+
+/// Waves of the angles of joints up to order `most`, each of a size that follows a variable of its joint.
+pub(super) fn followed(
+    cause: &'static dyn Cause,
+    survey: &Survey,
+    joints: impl Iterator<Item = usize>,
+    most: u32,
+    by: fn(usize) -> Variable,
+) -> Vec<Hypothesis> {
+    let terms = joints.flat_map(|joint| {
+        let law = move |order| wave(Variable::Angle { joint }, order).times(by(joint), Basis::PROPORTIONAL);
+        within_travel(survey, joint, most).map(move |order| Term::new(cause, Motion::Joint { joint }, law(order)))
+    });
+    terms.map(|term| Hypothesis::new(term, 2 * most as usize)).collect()
 }
 
 /// The numbers of such an error, with the scale of each.

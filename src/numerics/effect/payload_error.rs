@@ -3,8 +3,7 @@
 use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, CauseDescription, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable,
-    figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -27,17 +26,15 @@ pub struct WrongPayload {
 const TOOL: f64 = 5.0;
 
 impl Cause for PayloadError {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::PAYLOAD_ERROR,
-            place: "tool",
-            formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
-            size: "3 to 30 %",
-            confounded: "joint_hardening",
-            needs: "rows with and without the payload",
-            measure: Some(MEASURE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::PAYLOAD_ERROR,
+        place: "tool",
+        formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
+        size: "3 to 30 %",
+        confounded: "joint_hardening",
+        needs: "rows with and without the payload",
+        measure: Some(MEASURE),
+        read: Some(Form::kept::<WrongPayload>),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -54,7 +51,7 @@ impl Cause for PayloadError {
 
     fn sentence(&self, summary: &Summary) -> String {
         match summary.parameters.first() {
-            // Of its forms a tool's mass alone loads an arm without a payload.
+            // A tool's mass is its only form that loads an arm without a payload.
             Some(n) if summary.variables(self.name()).contains(&Variable::ArmLoad) => {
                 let how = if n.value < 0.0 { "less" } else { "more" };
                 format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
@@ -65,10 +62,6 @@ impl Cause for PayloadError {
             }
             None => "the payload is not what was declared".to_string(),
         }
-    }
-
-    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(WrongPayload::deserialize(body).map(Form::from))
     }
 }
 

@@ -157,7 +157,7 @@ impl PlacementBuffers {
     pub(super) fn velocities(&mut self, robot: &RobotModel, point: &Vector3<f64>) {
         let Self { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = self;
         for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
-            // Of a twist (v; w) in the frame: R v + R w x arm.
+            // A twist (v; w) in the frame moves the point by R v + R w x arm.
             let mut spatial = Matrix3x6::zeros();
             spatial.fixed_view_mut::<3, 3>(0, 0).copy_from(&frame.rotation);
             spatial.fixed_view_mut::<3, 3>(0, 3).copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
@@ -175,7 +175,7 @@ impl PlacementBuffers {
 #[derive(Clone)]
 pub(super) struct Turns {
     by_joint: Vec<Vector3<f64>>,
-    /// Of a station its frame, and the rotation in it by the station's twist.
+    /// The frame of each station, and the rotation in it by the station's twist.
     by_station: Vec<(Matrix3<f64>, Matrix3x6<f64>)>,
 }
 

@@ -1,9 +1,7 @@
 //! `presliding`: lost motion that fades in over a travel after each reversal, as friction does before surfaces slide (Dahl).
 
 use super::basis::around;
-use super::{
-    Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, names,
-};
+use super::{Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -23,21 +21,18 @@ impl Presliding {
 }
 
 impl Cause for Presliding {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::PRESLIDING,
-            place: "joint",
-            formula: "d = c z, z -> s + (z - s) exp(-|dq| / travel) from row to row",
-            size: "5 to 60 arcsec over 0.5 to 10 deg",
-            confounded: "backlash where all moves are long, joint_log_lag",
-            needs: "rows in the order of measurement, short moves among them",
-            measure: Some(Measure {
-                rank: 5,
-                advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
-            }),
-            absorbs_residual: &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::PRESLIDING,
+        place: "joint",
+        formula: "d = c z, z -> s + (z - s) exp(-|dq| / travel) from row to row",
+        size: "5 to 60 arcsec over 0.5 to 10 deg",
+        confounded: "backlash where all moves are long, joint_log_lag",
+        needs: "rows in the order of measurement, short moves among them",
+        measure: Some(Measure {
+            rank: 5,
+            advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
+        }),
+        absorbs_residual: &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

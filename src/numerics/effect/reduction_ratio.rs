@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -12,20 +12,14 @@ use crate::units::Unit;
 pub struct ReductionRatio;
 
 impl Cause for ReductionRatio {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::REDUCTION_RATIO,
-            place: "joint",
-            formula: "d = c q",
-            size: "1e-5 to 1e-3",
-            confounded: "joint_compliance, gear_cyclic of order 1",
-            needs: "a wide travel of the joint",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+    about! {
+        name: names::REDUCTION_RATIO,
+        place: "joint",
+        formula: "d = c q",
+        size: "1e-5 to 1e-3",
+        confounded: "joint_compliance, gear_cyclic of order 1",
+        needs: "a wide travel of the joint",
+        arm_effect: Some(|_| Box::new(ReductionRatio)),
     }
 }
 

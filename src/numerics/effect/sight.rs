@@ -30,7 +30,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Of a point in the instrument's frame, m.
+    /// Where an instrument sees a point of its frame, m.
     pub fn of(point: &Vector3<f64>) -> Self {
         let level = point.x.hypot(point.y);
         Self { azimuth: libm::atan2(point.y, point.x), elevation: libm::atan2(point.z, level), range: point.norm() }

@@ -1,7 +1,8 @@
 //! A torque by the angle of a joint on top of gravity, as of a balancer's spring or a hose: periodic in the angle, seen through the joint's
 //! compliance (without one it moves nothing).
 //!
-//! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
+//! Its torque is of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest,
+//! or is slack.
 
 use super::form::placed;
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable, names};

@@ -53,20 +53,11 @@ impl<'a> Survey<'a> {
         let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
         let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
         let reference_c = rows.first().and_then(|row| data.temperature(*row));
-        let mut out = Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c, payload_change: None };
-        out.payload_change = out.only_payload_change().and_then(|at| {
-            let near = out.changes_near(at);
+        let payload_change = only_payload_change(data, rows).and_then(|at| {
+            let near = near(&boundaries, at);
             Some([*near.first()?, *near.last()?])
         });
-        out
-    }
-
-    /// When the payload changes (s), where it does so once.
-    fn only_payload_change(&self) -> Option<f64> {
-        let mut by_time: Vec<(f64, f64)> = self.rows.iter().map(|row| (self.data.time(*row), self.data.payload[*row])).collect();
-        by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut changes = by_time.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| 0.5 * (pair[0].0 + pair[1].0));
-        changes.next().filter(|_| changes.next().is_none())
+        Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c, payload_change }
     }
 
     /// Whether the payload changes once, so that what follows it may as well have moved then.
@@ -139,10 +130,8 @@ impl<'a> Survey<'a> {
     }
 
     /// The change points around one.
-    pub fn changes_near(&self, time: f64) -> Vec<f64> {
-        let at = self.boundaries.partition_point(|other| *other < time);
-        let reach = self.boundaries.len().div_ceil(40).max(1) + 1;
-        self.boundaries[at.saturating_sub(reach)..(at + reach).min(self.boundaries.len())].to_vec()
+    pub fn changes_near(&self, time: f64) -> &[f64] {
+        near(&self.boundaries, time)
     }
 
     /// Whether an instrument at the recording's origin sees the points from outside: then they are nowhere as far apart as it is away.
@@ -171,8 +160,28 @@ impl<'a> Survey<'a> {
 
     /// Half of the largest payload, kg.
     pub fn heavy_payload(&self) -> f64 {
-        0.5 * self.rows.iter().map(|row| self.data.payload[*row]).fold(0.0, f64::max)
+        heavy_payload(self.data, self.rows)
     }
+}
+
+/// Those of some change points that are around a time.
+fn near(boundaries: &[f64], time: f64) -> &[f64] {
+    let at = boundaries.partition_point(|other| *other < time);
+    let reach = boundaries.len().div_ceil(40).max(1) + 1;
+    &boundaries[at.saturating_sub(reach)..(at + reach).min(boundaries.len())]
+}
+
+/// Half of the largest payload of some rows, kg.
+fn heavy_payload(data: &Measurements, rows: &[usize]) -> f64 {
+    0.5 * rows.iter().map(|row| data.payload[*row]).fold(0.0, f64::max)
+}
+
+/// When the payload of some rows changes (s), where it does so once.
+fn only_payload_change(data: &Measurements, rows: &[usize]) -> Option<f64> {
+    let mut by_time: Vec<(f64, f64)> = rows.iter().map(|row| (data.time(*row), data.payload[*row])).collect();
+    by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut changes = by_time.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| 0.5 * (pair[0].0 + pair[1].0));
+    changes.next().filter(|_| changes.next().is_none())
 }
 
 /// An effect at a place in a form, as a possible cause of what the model leaves.

@@ -1,9 +1,7 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
 use super::motion::{SHORT, extent};
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, warmth,
-};
+use super::{Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, warmth};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -23,17 +21,14 @@ pub(super) const MEASURE: Measure =
     Measure { rank: 4, advice: "log the arm's temperature from a cold start and watch a fixed target on the floor" };
 
 impl Cause for ThermalGrowth {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "thermal_growth",
-            place: "link, or neighbouring links",
-            formula: "lengths grow by c (T - T0), or c (1 - exp(-time / tau))",
-            size: "10 to 25 um/m for each kelvin",
-            confounded: "tracker_drift, growth of neighbouring links",
-            needs: "temperature or time",
-            measure: Some(MEASURE),
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "thermal_growth",
+        place: "link, or neighbouring links",
+        formula: "lengths grow by c (T - T0), or c (1 - exp(-time / tau))",
+        size: "10 to 25 um/m for each kelvin",
+        confounded: "tracker_drift, growth of neighbouring links",
+        needs: "temperature or time",
+        measure: Some(MEASURE),
     }
 
     /// Every run of neighbouring links.
@@ -59,10 +54,6 @@ impl Cause for ThermalGrowth {
             Basis::Settling { .. } => vec![("in_the_end".into(), Unit::One, 1e-2)],
             _ => vec![("per_kelvin".into(), Unit::One, 1e-3)],
         }
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
     }
 
     fn impossible(&self, term: &Term, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {

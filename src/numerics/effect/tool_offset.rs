@@ -1,8 +1,8 @@
 //! `tool_offset`: the measured point sits elsewhere on the tool; three parameters a target, base axes at the zero pose.
 //!
-//! Where its orientation is measured too, three more turn a target about its seat.
+//! Where its orientation is measured too, three more turn a target about where it is mounted.
 
-use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place, names};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -27,20 +27,14 @@ impl ToolOffset {
 }
 
 impl Cause for ToolOffset {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::TOOL_OFFSET,
-            place: "tool",
-            formula: "a displacement of the measured point",
-            size: "any",
-            confounded: "link_geometry of the last link",
-            needs: "-",
-            ..CauseDescription::PLAIN
-        }
-    }
-
-    fn arm_effect(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        Some(Box::new(Self))
+    about! {
+        name: names::TOOL_OFFSET,
+        place: "tool",
+        formula: "a displacement of the measured point",
+        size: "any",
+        confounded: "link_geometry of the last link",
+        needs: "-",
+        arm_effect: Some(|_| Box::new(ToolOffset)),
     }
 }
 

@@ -1,39 +1,27 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
 use super::{
-    Axes, Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, NumberSpec, Place, Summary,
-    Survey, Term, change, holder, names,
+    Axes, Cause, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, Place, Summary, Survey, about, change, holder,
+    names,
 };
-use crate::robot::RobotModel;
 
 /// A target that moves at some time.
 pub struct ToolShift;
 
 impl Cause for ToolShift {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::TOOL_SHIFT,
-            place: "tool",
-            formula: "the target moves at some time",
-            size: "20 to 500 um",
-            confounded: "zero_shift of the last joints",
-            needs: "rows in the order of measurement",
-            measure: Some(change::MEASURE),
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::TOOL_SHIFT,
+        place: "tool",
+        formula: "the target moves at some time",
+        size: "20 to 500 um",
+        confounded: "zero_shift of the last joints",
+        needs: "rows in the order of measurement",
+        measure: Some(change::MEASURE),
+        separable_by_poses: false,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         change::propose(&Self, &[Motion::Tool { axes: Axes::Place }], survey)
-    }
-
-    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        term.motion().frame_numbers(|name| name.to_string())
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
-        change::near(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

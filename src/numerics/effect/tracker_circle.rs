@@ -1,6 +1,6 @@
 //! `tracker_circle`: the horizontal circle of the instrument sits off its axis, or is out of round: azimuths err once or twice a turn.
 
-use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
+use super::{Cause, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -14,18 +14,15 @@ const ORDERS: u32 = 2;
 pub(super) const MEASURE: Measure = Measure { rank: 2, advice: "measure fixed points in both faces, and from a second station" };
 
 impl Cause for TrackerCircle {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "tracker_circle",
-            place: "tracker",
-            formula: "azimuth errs by a sin(n az) + b cos(n az), n = 1, 2",
-            size: "0.5 to 5 arcsec",
-            confounded: "base_frame and gear_cyclic of joint 1 where the azimuth changes little",
-            needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
-            measure: Some(MEASURE),
-            of_the_measurement: true,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "tracker_circle",
+        place: "tracker",
+        formula: "azimuth errs by a sin(n az) + b cos(n az), n = 1, 2",
+        size: "0.5 to 5 arcsec",
+        confounded: "base_frame and gear_cyclic of joint 1 where the azimuth changes little",
+        needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
+        measure: Some(MEASURE),
+        of_the_measurement: true,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -37,10 +34,6 @@ impl Cause for TrackerCircle {
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         orders::numbers(Unit::Radian, 1e-3)
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -1,9 +1,7 @@
 //! `tracker_drift`: the tracker's frame moves slowly: steadily, with the warm-up, or as a slow curve in time.
 
 use super::basis::around;
-use super::{
-    Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, warmth,
-};
+use super::{Axes, Basis, Cause, Clock, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, warmth};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 
@@ -15,19 +13,16 @@ const POWERS: [f64; 2] = [0.25, 3.0];
 const SLOW: usize = 3;
 
 impl Cause for TrackerDrift {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "tracker_drift",
-            place: "tracker",
-            formula: "the tracker's frame moves steadily, with the warm-up, or slowly",
-            size: "10 to 200 um",
-            confounded: "thermal_growth, base_shift",
-            needs: "time",
-            measure: Some(super::thermal_growth::MEASURE),
-            of_the_measurement: true,
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "tracker_drift",
+        place: "tracker",
+        formula: "the tracker's frame moves steadily, with the warm-up, or slowly",
+        size: "10 to 200 um",
+        confounded: "thermal_growth, base_shift",
+        needs: "time",
+        measure: Some(super::thermal_growth::MEASURE),
+        of_the_measurement: true,
+        separable_by_poses: false,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

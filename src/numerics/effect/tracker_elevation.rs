@@ -3,29 +3,27 @@
 
 use super::summary::amplitude;
 use super::tracker_circle::MEASURE;
-use super::{Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
+use super::{Cause, Hypothesis, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
 pub struct TrackerElevation;
 
-/// Of the elevation, once and twice a turn; of the azimuth, once: a transit axis that is not level turns it by the tangent of the elevation.
+/// What errs, and how often a turn: the elevation once and twice, the azimuth once, which a transit axis that is not level turns by the
+/// tangent of the elevation.
 const WAYS: [(Polar, u32); 3] = [(Polar::Elevation, 1), (Polar::Elevation, 2), (Polar::Azimuth, 1)];
 
 impl Cause for TrackerElevation {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "tracker_elevation",
-            place: "tracker",
-            formula: "elevation or azimuth errs by a sin(n el) + b cos(n el), n = 1, 2",
-            size: "0.5 to 5 arcsec",
-            confounded: "base_frame and link_geometry where the elevation changes little",
-            needs: "points measured from outside the arm's reach, the instrument at the recording's origin, its z upright",
-            measure: Some(MEASURE),
-            of_the_measurement: true,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "tracker_elevation",
+        place: "tracker",
+        formula: "elevation or azimuth errs by a sin(n el) + b cos(n el), n = 1, 2",
+        size: "0.5 to 5 arcsec",
+        confounded: "base_frame and link_geometry where the elevation changes little",
+        needs: "points measured from outside the arm's reach, the instrument at the recording's origin, its z upright",
+        measure: Some(MEASURE),
+        of_the_measurement: true,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

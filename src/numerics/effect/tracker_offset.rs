@@ -1,8 +1,6 @@
 //! `tracker_offset`: every range is wrong by the same length: a dead path, or the constant of another reflector.
 
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
-};
+use super::{Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, figure};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -13,18 +11,15 @@ pub struct TrackerOffset;
 const ANY: Basis = Basis::After { at: 0.0 };
 
 impl Cause for TrackerOffset {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "tracker_offset",
-            place: "tracker",
-            formula: "ranges are longer by c",
-            size: "5 um to the radius of a reflector",
-            confounded: "base_frame and link_geometry, which absorb most of it from afar",
-            needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
-            measure: Some(Measure { rank: 2, advice: "measure a line of three points from within it and from its end" }),
-            of_the_measurement: true,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "tracker_offset",
+        place: "tracker",
+        formula: "ranges are longer by c",
+        size: "5 um to the radius of a reflector",
+        confounded: "base_frame and link_geometry, which absorb most of it from afar",
+        needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
+        measure: Some(Measure { rank: 2, advice: "measure a line of three points from within it and from its end" }),
+        of_the_measurement: true,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

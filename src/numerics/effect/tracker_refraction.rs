@@ -1,8 +1,7 @@
 //! `tracker_refraction`: ranges scale with the air's temperature, which the instrument does not follow.
 
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
-    warmth,
+    Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, figure, warmth,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
@@ -18,22 +17,19 @@ const WARM_UP: f64 = 30.0;
 const AIR: f64 = 5e-6;
 
 impl Cause for TrackerRefraction {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "tracker_refraction",
-            place: "tracker",
-            formula: "ranges grow by c (T - T0), or c (1 - exp(-time / tau)), in proportion to their length",
-            size: "1 um/m for each kelvin",
-            confounded: "tracker_drift and thermal_growth of all links",
-            needs: "temperature or time, the instrument at the recording's origin",
-            measure: Some(Measure {
-                rank: 2,
-                advice: "log the air's temperature and measure a fixed point on the floor now and then",
-            }),
-            of_the_measurement: true,
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "tracker_refraction",
+        place: "tracker",
+        formula: "ranges grow by c (T - T0), or c (1 - exp(-time / tau)), in proportion to their length",
+        size: "1 um/m for each kelvin",
+        confounded: "tracker_drift and thermal_growth of all links",
+        needs: "temperature or time, the instrument at the recording's origin",
+        measure: Some(Measure {
+            rank: 2,
+            advice: "log the air's temperature and measure a fixed point on the floor now and then",
+        }),
+        of_the_measurement: true,
+        separable_by_poses: false,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -50,10 +46,6 @@ impl Cause for TrackerRefraction {
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
         let settling = matches!(term.basis(), Basis::Settling { .. });
         vec![(if settling { "in_the_end" } else { "per_kelvin" }.into(), Unit::One, 1e-4)]
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        warmth::near(term, survey, level)
     }
 
     fn impossible(&self, term: &Term, p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {

@@ -9,8 +9,8 @@ use super::motion::{SHORT, extent};
 use super::orders;
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NamedForms, NumberSpec, Place, Polar, Summary, Survey,
-    Term, Variable, names, warmth,
+    Axes, Basis, Cause, Form, Hypothesis, Law, Motion, NamedForms, NumberSpec, Place, Polar, Summary, Survey, Term, Variable,
+    about, names, warmth,
 };
 use super::{frames, interactions};
 use crate::criteria::effect::{HARDLY_EVER, LOW_ORDERS, OPEN, RARE, RARER, UNCOMMON};
@@ -104,17 +104,14 @@ impl Unknown {
 }
 
 impl Cause for Unknown {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::UNKNOWN,
-            place: "joint, link, base, tool or tracker",
-            formula: "a form-free function of joints, time, payload or sight",
-            size: "any",
-            confounded: "whatever is in no list",
-            needs: "-",
-            absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_TABLE],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::UNKNOWN,
+        place: "joint, link, base, tool or tracker",
+        formula: "a form-free function of joints, time, payload or sight",
+        size: "any",
+        confounded: "whatever is in no list",
+        needs: "-",
+        absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_TABLE],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

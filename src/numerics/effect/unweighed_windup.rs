@@ -56,7 +56,8 @@ const WIDE: f64 = 0.01;
 const LARGEST: f64 = 0.01;
 
 impl UnweighedWindup {
-    /// Of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file gives no mass.
+    /// Proposes wind-ups of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file
+    /// gives no mass.
     pub fn propose(cause: &'static dyn Cause, survey: &Survey) -> Vec<Hypothesis> {
         if !is_unweighed(survey.robot) {
             return Vec::new();

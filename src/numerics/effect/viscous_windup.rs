@@ -3,8 +3,8 @@
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
 use super::{
-    Basis, Cause, CauseDescription, Form, HiddenSize, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term,
-    Variable, figure, names,
+    Basis, Cause, Form, HiddenSize, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term, Variable, about, figure,
+    names,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -18,17 +18,14 @@ const LARGEST: f64 = 0.1;
 const TRAIL: f64 = 5.0 / 3600.0;
 
 impl Cause for ViscousWindup {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::VISCOUS_WINDUP,
-            place: "joint",
-            formula: "d = -c dq/dt: the joint trails in proportion to its speed",
-            size: "0.2 to 10 arcsec for each deg/s",
-            confounded: "joint_log_lag where one joint moves alone",
-            needs: "joint velocities, of a moving arm",
-            absorbs_residual: &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN],
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::VISCOUS_WINDUP,
+        place: "joint",
+        formula: "d = -c dq/dt: the joint trails in proportion to its speed",
+        size: "0.2 to 10 arcsec for each deg/s",
+        confounded: "joint_log_lag where one joint moves alone",
+        needs: "joint velocities, of a moving arm",
+        absorbs_residual: &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

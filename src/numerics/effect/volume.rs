@@ -126,7 +126,7 @@ impl PlacedRow<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{EffectContext, EffectStack, Load, whole};
+    use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
     use crate::robot::import::{RobotFileText, read_calib};
     use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Shape};
     use crate::spatial::Pose;
@@ -155,7 +155,7 @@ tool: {point: [20, 10, 60]}
             let robot = robot.clone().measured_by(MeasurementSetup { targets: Vec::new(), anchors: vec![anchor] });
             let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
             let names = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
-            let effects = names.iter().filter_map(|name| whole(name, &setting)).collect();
+            let effects = names.iter().filter_map(|name| arm_effect(name, &setting)).collect();
             let stack = EffectStack::new(&robot, Pose::identity(), effects);
             let x: Vec<f64> = (0..stack.specs().len()).map(|k| 3e-3 * (1.7 * k as f64).sin()).collect();
             let readings =

@@ -1,8 +1,8 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
 use super::{
-    Cause, CauseDescription, FittedForms, Hypothesis, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term, change,
-    holder, names,
+    Cause, FittedForms, Hypothesis, ModelledFinding, Motion, NumberSpec, Place, Summary, Survey, Term, about, change, holder,
+    names,
 };
 use crate::robot::RobotModel;
 
@@ -10,18 +10,15 @@ use crate::robot::RobotModel;
 pub struct ZeroShift;
 
 impl Cause for ZeroShift {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: names::ZERO_SHIFT,
-            place: "joint",
-            formula: "d = c after some time",
-            size: "10 to 500 arcsec",
-            confounded: "base_shift (joint 1), tool_shift (last joint)",
-            needs: "rows in the order of measurement",
-            measure: Some(change::MEASURE),
-            separable_by_poses: false,
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: names::ZERO_SHIFT,
+        place: "joint",
+        formula: "d = c after some time",
+        size: "10 to 500 arcsec",
+        confounded: "base_shift (joint 1), tool_shift (last joint)",
+        needs: "rows in the order of measurement",
+        measure: Some(change::MEASURE),
+        separable_by_poses: false,
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -31,10 +28,6 @@ impl Cause for ZeroShift {
 
     fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
         vec![("step".into(), term.motion().unit(robot), 0.1)]
-    }
-
-    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
-        change::near(term, survey)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -23,8 +23,8 @@ pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     if rows.len() < 3 {
         return KINDS.iter().find_map(|kind| kind.base(robot, data, all)).unwrap_or_else(Pose::identity);
     }
-    let seat = |row: usize| robot.mounting(robot.setup().target(data.target(row)));
-    let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
+    let target = |row: &usize| robot.last_body(data.q(*row)) * *robot.mounting_at(data, *row);
+    let model: Vec<Vector3<f64>> = rows.iter().map(|row| target(row).translation).collect();
     let measured: Vec<Vector3<f64>> = rows.iter().filter_map(|row| data.point(*row)).collect();
     align_points(&model, &measured)
 }

@@ -86,7 +86,7 @@ struct Reduced {
     /// Before any was taken in.
     original: (Vec<Vec<f64>>, Vec<f64>),
     lengths: Vec<f64>,
-    /// Of the noise, against what the weights say; never below one.
+    /// How large the noise is against what the weights say; never below one.
     scale: f64,
 }
 

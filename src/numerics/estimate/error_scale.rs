@@ -25,7 +25,7 @@ pub enum ErrorScale {
 }
 
 impl ErrorScale {
-    /// Of some rows of a recording.
+    /// The scale of errors of some rows of a recording.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         if data.readings.is_empty() && rows.iter().all(|row| data.has_point(*row)) {
             return Self::Lengths;

@@ -43,7 +43,7 @@ pub enum ParameterStatus {
 /// What [`fit`] says of the model that it returns.
 #[derive(Clone)]
 pub struct Fitted {
-    /// Of every parameter of the stack.
+    /// What became of every parameter of the stack.
     pub statuses: Vec<ParameterStatus>,
     /// Step by step.
     pub course: Vec<Iteration>,
@@ -69,7 +69,7 @@ pub struct Fitted {
     pub clusters: usize,
     /// By what the standard deviations are larger than those of the stated noise.
     pub noise_scale: f64,
-    /// Of the free parameters; `None` where the factor is singular.
+    /// Covariance of the free parameters; `None` where the factor is singular.
     pub covariance: Option<Covariance>,
     /// (name, value, meaning).
     pub indices: Vec<(&'static str, f64, &'static str)>,
@@ -87,9 +87,9 @@ impl Fitted {
     }
 }
 
-/// Of rounds whose weights are not settled.
+/// Effort of rounds whose weights are not settled.
 const ROUGH: Effort = Effort { tolerance: ROUGH_TOLERANCE, ..FINE };
-/// Of the first round, which only finds out how large the residual is and what it lets one see.
+/// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
 const CLEARLY: f64 = 10.0;

@@ -30,7 +30,7 @@ pub(crate) struct NearbyFits<'a> {
     scale: ErrorScale,
     /// Parameters that are estimated or moved.
     columns: Vec<usize>,
-    /// Of all parts and the priors.
+    /// The factor of all parts and the priors.
     whole: TriangularFactor,
     parts: Vec<LeftOutRows<'a>>,
 }

@@ -25,7 +25,7 @@ const STRETCHES: usize = 40;
 /// Errors (m) of rows under fits without them, in the order of the fitted rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Folds {
-    /// Of either kind.
+    /// Folds of either kind.
     pub count: usize,
     /// Folds drawn at random: new poses among those that were measured.
     pub random: Vec<f64>,

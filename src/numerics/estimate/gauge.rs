@@ -27,11 +27,11 @@ pub fn gauge(
         None if kinds(data).iter().any(|kind| kind.about().rank.rotations) => &[String::new()],
         None => &[],
     };
-    let seat = |name: &String| {
+    let target = |name: &String| {
         let offset = stated.get(name).copied().unwrap_or_else(Vector3::zeros);
         Target { name: name.clone(), mounting: Pose::new(home.rotation, home.point(&offset)), oriented: false }
     };
-    let mut robot = robot.measured_by(MeasurementSetup { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
+    let mut robot = robot.measured_by(MeasurementSetup { targets: names.iter().map(target).collect(), anchors: Vec::new() });
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
     let mut base = align(&robot, data, rows);
     for _ in 0..ROUNDS {

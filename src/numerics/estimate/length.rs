@@ -19,7 +19,7 @@ pub(super) struct StandingAnchor<'a> {
     pub place: Vector3<f64>,
     pub shape: Shape,
     anchor: &'a Anchor,
-    /// Of the stack.
+    /// Its first parameter in the stack.
     first: usize,
     tilt: [f64; 2],
 }

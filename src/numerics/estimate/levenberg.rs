@@ -41,7 +41,7 @@ pub struct Iteration {
     pub gradient: f64,
     /// Norm of the step that led here, in sigmas of prediction.
     pub step_norm: f64,
-    /// Of the step that was taken.
+    /// Damping of the step that was taken.
     pub damping: f64,
 }
 

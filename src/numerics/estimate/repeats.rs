@@ -5,7 +5,7 @@
 
 use super::fisher::tail;
 use super::model::Model;
-use crate::effect::{EffectContext, EffectStack, Load, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
 use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
 use crate::robot::pose_groups::{NEAR, SAME, STILL, grouped, near};
@@ -36,7 +36,7 @@ pub struct Repeated {
 impl Poses {
     /// Poses of some rows of a recording.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
-        // Of a moving arm the rows beside one are always near.
+        // The neighbours of a row are always near in a recording of a moving arm.
         let limit = if data.in_motion(rows) { SAME } else { NEAR };
         let poses = grouped(rows, |row| data.q(row), limit, |a, b| data.payload[a] == data.payload[b]);
         let points = poses.iter().flat_map(|rows| points(data, rows)).collect();
@@ -105,7 +105,7 @@ impl Poses {
     }
 }
 
-/// Of the median scatter: five times its standard deviation.
+/// A scatter of so many times the median one is strange: five times its standard deviation.
 const STRANGE: f64 = 25.0;
 /// Joint repeatability between these (rad) is looked for: 0.002 to 2000 arcsec.
 const FINEST: f64 = 1e-8;
@@ -195,7 +195,7 @@ impl PoseGroup {
 /// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
 fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
     let setting = EffectContext { base: model.base(), load: Load::GravityTorque };
-    let zeros = whole("joint_offset", &setting);
+    let zeros = arm_effect("joint_offset", &setting);
     let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
     let mut scratch = joints.stack.scratch(&joints.robot);
     let mut columns = vec![Vector3::zeros(); joints.robot.joints()];

@@ -29,7 +29,8 @@ pub struct ArmScale {
     pub reach: f64,
 }
 
-/// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
+/// The scale of an arm by rows that were fitted; none where links stay at nominal, or where some measured other than that the target was
+/// brought to a place.
 pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());

@@ -16,7 +16,7 @@ impl Model {
         match effect.name() {
             names::BASE_FRAME => (component(self.stack.base(), number), component(&self.base(), number)),
             names::ANCHOR => self.anchored(number).unwrap_or(change),
-            names::TOOL_OFFSET => self.seat(number, &self.x[range]).unwrap_or(change),
+            names::TOOL_OFFSET => self.mounting(number, &self.x[range]).unwrap_or(change),
             _ => change,
         }
     }
@@ -42,7 +42,7 @@ impl Model {
     }
 
     /// The `number`-th parameter of targets with corrections `x`; none where the tool point is what is measured.
-    fn seat(&self, number: usize, x: &[f64]) -> Option<(f64, f64)> {
+    fn mounting(&self, number: usize, x: &[f64]) -> Option<(f64, f64)> {
         let mut first = 0;
         for target in &self.robot.setup().targets {
             let width = if target.oriented { 6 } else { 3 };
@@ -57,13 +57,13 @@ impl Model {
     }
 
     /// x, y, z from the tool point (m), or a component of the rotation vector from the tool frame (rad), base axes at the zero pose.
-    fn beside_tool(&self, seat: &Pose, axis: usize) -> f64 {
+    fn beside_tool(&self, mounting: &Pose, axis: usize) -> f64 {
         let home = self.robot.home();
-        component(&Pose::new(seat.rotation * home.rotation.transpose(), seat.translation - home.translation), axis)
+        component(&Pose::new(mounting.rotation * home.rotation.transpose(), mounting.translation - home.translation), axis)
     }
 }
 
-/// The seat after corrections as `tool_offset` makes them.
+/// The mounting after corrections as `tool_offset` makes them.
 fn corrected(target: &Target, x: &[f64]) -> Pose {
     let mut twist = Twist::zeros();
     for (axis, value) in x.iter().enumerate() {

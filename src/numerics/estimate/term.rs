@@ -68,7 +68,7 @@ pub(crate) fn as_of_three(axes: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{EffectContext, EffectStack, Load, whole};
+    use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
     use crate::estimate::Model;
     use crate::observation::{Dimension, KindDescription, Rank, Weight};
     use crate::robot::import::{RobotFileText, read_calib};
@@ -124,7 +124,7 @@ joints: [{name: A1}, {name: A2}]
     fn a_kind_of_more_than_three_numbers_has_a_residual_as_wide_and_its_own_partials() {
         let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
         let base = Pose::identity();
-        let effects = vec![whole("joint_offset", &EffectContext { base, load: Load::GravityTorque }).expect("a cause")];
+        let effects = vec![arm_effect("joint_offset", &EffectContext { base, load: Load::GravityTorque }).expect("a cause")];
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
         let readings = Readings { kind: "five_lines", width: 5, values: vec![0.1; 5], sigma: vec![SIGMA], anchor: None };
         let data = Measurements {

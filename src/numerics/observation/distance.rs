@@ -21,16 +21,13 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Length,
     axes: 1,
     columns: &[
-        DeclaredColumn::number(
-            "distance",
+        DeclaredColumn::value(
             &["distance"],
             Length,
             [1e-6, 200.0],
             "Distance of the target from an anchor: a draw-wire or ballbar.",
-        )
-        .as_part(Part::Value),
-        DeclaredColumn::number("sigma_distance", &["sigma_distance"], Length, [0.0, 1.0], "Standard deviation of the distance.")
-            .as_part(Part::Sigma),
+        ),
+        DeclaredColumn::sigma(&["sigma_distance"], Length, "Standard deviation of the distance."),
         DeclaredColumn::text("anchor", "Which of several anchors the distance goes to; their places are estimated.")
             .as_part(Part::Anchor),
     ],
@@ -77,8 +74,8 @@ impl MeasurementKind for Distance {
         let mut by_name: BTreeMap<&str, Vec<(Vector3<f64>, f64)>> = BTreeMap::new();
         for row in rows {
             if let Some(reading) = self.reading(data, *row) {
-                let seat = robot.mounting(robot.setup().target(data.target(*row)));
-                let point = (*base * robot.last_body(data.q(*row))).point(&seat.translation);
+                let mounting = robot.mounting_at(data, *row);
+                let point = (*base * robot.last_body(data.q(*row))).point(&mounting.translation);
                 by_name.entry(reading.anchor).or_default().push((point, reading.values[0]));
             }
         }

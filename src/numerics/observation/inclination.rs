@@ -3,7 +3,7 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
@@ -23,20 +23,15 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Angle,
     axes: 2,
     columns: &[
-        DeclaredColumn::number(
-            "tilt_x",
+        DeclaredColumn::value(
             &["tilt_x"],
             Angle,
             UPRIGHT,
             "Angle of the target's x axis above the horizon: a level on the tool.",
         )
-        .as_part(Part::Value)
         .together(BOTH),
-        DeclaredColumn::number("tilt_y", &["tilt_y"], Angle, UPRIGHT, "Angle of the target's y axis above the horizon.")
-            .as_part(Part::Value)
-            .together(BOTH),
-        DeclaredColumn::number("sigma_tilt", &["sigma_tilt"], Angle, [0.0, 1.0], "Standard deviation of the level's angles.")
-            .as_part(Part::Sigma),
+        DeclaredColumn::value(&["tilt_y"], Angle, UPRIGHT, "Angle of the target's y axis above the horizon.").together(BOTH),
+        DeclaredColumn::sigma(&["sigma_tilt"], Angle, "Standard deviation of the level's angles."),
     ],
     own_sigma: true,
     rank: Rank { places: false, rotations: true, scale: true, blind: [3, 1] },

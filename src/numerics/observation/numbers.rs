@@ -13,7 +13,7 @@ pub struct ResidualNumbers {
 }
 
 impl ResidualNumbers {
-    /// Of so many numbers, [`WIDEST`] at most.
+    /// A residual of so many numbers, [`WIDEST`] at most.
     pub fn new<const N: usize>(own: [f64; N]) -> Self {
         let mut values = [0.0; WIDEST];
         values[..N].copy_from_slice(&own);

@@ -3,7 +3,7 @@
 //! u = -y / x to the right, v = -z / x downwards: the frame's x axis is the optical axis, z is up. They are pixels from the principal point
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
-use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, ResidualNumbers, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, ResidualNumbers, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -29,32 +29,16 @@ static ABOUT: KindDescription = KindDescription {
     dimension: Dimension::Angle,
     axes: 2,
     columns: &[
-        DeclaredColumn::number(
-            "image_x",
+        DeclaredColumn::value(
             &["image_x"],
             Number,
             VIEW,
             "Image x of the target over the focal length, to the right, of a camera that is the recording's frame; no unit.",
         )
-        .as_part(Part::Value)
         .together(BOTH),
-        DeclaredColumn::number(
-            "image_y",
-            &["image_y"],
-            Number,
-            VIEW,
-            "Image y of the target over the focal length, downwards; no unit.",
-        )
-        .as_part(Part::Value)
-        .together(BOTH),
-        DeclaredColumn::number(
-            "sigma_image",
-            &["sigma_image"],
-            Number,
-            [0.0, 1.0],
-            "Standard deviation of each of the two; no unit.",
-        )
-        .as_part(Part::Sigma),
+        DeclaredColumn::value(&["image_y"], Number, VIEW, "Image y of the target over the focal length, downwards; no unit.")
+            .together(BOTH),
+        DeclaredColumn::sigma(&["sigma_image"], Number, "Standard deviation of each of the two; no unit."),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [0, 0] },
@@ -72,7 +56,7 @@ impl MeasurementKind for Planar {
         Some((ResidualNumbers::new([left(0), left(1)]), reading.sigma * reading.sigma))
     }
 
-    /// Of a quotient: d(a / c) = (da - a / c dc) / c.
+    /// The derivative of a quotient: d(a / c) = (da - a / c dc) / c.
     fn sensitivity(&self, _data: &Measurements, _row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
         let point = CAMERA * placed.point;
         let depth = point.z.max(NEAREST);
@@ -88,11 +72,11 @@ impl MeasurementKind for Planar {
 
     /// The camera's pose by the direct linear transform (Hartley and Zisserman, 2004, 7.1): the nominal arm's points against their images.
     fn base(&self, robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<Pose> {
-        let seat = |row: usize| robot.mounting(robot.setup().target(data.target(row)));
         let seen = rows.iter().filter_map(|row| Some((*row, self.reading(data, *row)?)));
         let pairs: Vec<(Vector3<f64>, [f64; 2])> = seen
             .map(|(row, reading)| {
-                ((robot.last_body(data.q(row)) * *seat(row)).translation, [reading.values[0], reading.values[1]])
+                let target = robot.last_body(data.q(row)) * *robot.mounting_at(data, row);
+                (target.translation, [reading.values[0], reading.values[1]])
             })
             .collect();
         if pairs.len() < FEWEST {
@@ -115,7 +99,7 @@ impl MeasurementKind for Planar {
         let least = eigen.eigenvalues.imin();
         let camera = eigen.eigenvectors.column(least);
         let turned = Matrix3::from_fn(|i, j| camera[4 * i + j]);
-        // Of a rotation times a scale; the scale has the sign of the determinant.
+        // It is a rotation times a scale, which has the sign of the determinant.
         let scale = libm::cbrt(turned.determinant());
         let svd = (turned / scale).svd(true, true);
         let rotation = svd.u? * svd.v_t?;

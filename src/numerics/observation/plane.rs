@@ -23,14 +23,7 @@ static ABOUT: KindDescription = KindDescription {
     columns: &[
         DeclaredColumn::text("plane", "The plane that the target touches: a table, the face of a cube; it is estimated.")
             .as_part(Part::Anchor),
-        DeclaredColumn::number(
-            "sigma_plane",
-            &["sigma_plane"],
-            Length,
-            [0.0, 1.0],
-            "Standard deviation, along its normal, with which a plane is touched.",
-        )
-        .as_part(Part::Sigma),
+        DeclaredColumn::sigma(&["sigma_plane"], Length, "Standard deviation, along its normal, with which a plane is touched."),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
@@ -77,7 +70,7 @@ impl MeasurementKind for PlaneKind {
             let scatter: Matrix3<f64> = points.iter().map(|point| (point - place) * (point - place).transpose()).sum();
             let axes = scatter.symmetric_eigen();
             let normal: Vector3<f64> = axes.eigenvectors.column(axes.eigenvalues.imin()).into();
-            // Of the two that are one plane, the normal that points up.
+            // Two normals are one plane: that which points up is taken.
             let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
             Ok(Anchor { name: name.into(), place, shape: Shape::Plane(normal.normalize() * sign) })
         };

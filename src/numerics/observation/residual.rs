@@ -28,13 +28,13 @@ impl ExcessSigma {
 pub struct Residual {
     /// What was measured.
     pub kind: &'static dyn MeasurementKind,
-    /// Of the recording.
+    /// The row of the recording.
     pub row: usize,
     /// m or rad, as many numbers as the kind has; 0 where one was not measured.
     pub error: ResidualNumbers,
     /// How many values were measured.
     pub axes: usize,
-    /// Of each value, where the kind has one for all.
+    /// Variance of each value, where the kind has one for all.
     variance: f64,
 }
 

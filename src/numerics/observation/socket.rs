@@ -20,14 +20,11 @@ static ABOUT: KindDescription = KindDescription {
     columns: &[
         DeclaredColumn::text("socket", "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.")
             .as_part(Part::Anchor),
-        DeclaredColumn::number(
-            "sigma_socket",
+        DeclaredColumn::sigma(
             &["sigma_socket"],
             Length,
-            [0.0, 1.0],
             "Standard deviation per axis with which the ball comes back to a socket.",
-        )
-        .as_part(Part::Sigma),
+        ),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },
@@ -50,8 +47,8 @@ pub(super) fn touches<'a>(
         let known: Vec<&str> = touched.keys().copied().collect();
         for row in (0..data.rows()).filter(|row| fitted[*row] == fit) {
             if let Some(reading) = kind.reading(data, row).filter(|reading| !known.contains(&reading.anchor)) {
-                let seat = robot.mounting(robot.setup().target(data.target(row)));
-                touched.entry(reading.anchor).or_default().push((*base * robot.last_body(data.q(row))).point(&seat.translation));
+                let ball = robot.mounting_at(data, row).translation;
+                touched.entry(reading.anchor).or_default().push((*base * robot.last_body(data.q(row))).point(&ball));
             }
         }
     }

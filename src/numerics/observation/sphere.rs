@@ -27,14 +27,7 @@ static ABOUT: KindDescription = KindDescription {
             "The sphere whose surface the target touches; its centre is estimated, and its radius with that of a ball on the tool.",
         )
         .as_part(Part::Anchor),
-        DeclaredColumn::number(
-            "sigma_sphere",
-            &["sigma_sphere"],
-            Length,
-            [0.0, 1.0],
-            "Standard deviation, along its normal, with which a sphere is touched.",
-        )
-        .as_part(Part::Sigma),
+        DeclaredColumn::sigma(&["sigma_sphere"], Length, "Standard deviation, along its normal, with which a sphere is touched."),
     ],
     own_sigma: true,
     rank: Rank { places: true, rotations: false, scale: false, blind: [3, 3] },

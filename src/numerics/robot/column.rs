@@ -115,6 +115,16 @@ impl DeclaredColumn {
         }
     }
 
+    /// A measured number, stored by the name of its setting.
+    pub const fn value(name: &'static [&'static str; 1], quantity: Quantity, range: [f64; 2], about: &'static str) -> Self {
+        Self::number(name[0], name, quantity, range, about).as_part(Part::Value)
+    }
+
+    /// The standard deviation of what was measured, stored by the name of its setting.
+    pub const fn sigma(name: &'static [&'static str; 1], quantity: Quantity, about: &'static str) -> Self {
+        Self::number(name[0], name, quantity, [0.0, 1.0], about).as_part(Part::Sigma)
+    }
+
     /// A text, stored by the name of its setting.
     pub const fn text(setting: &'static str, about: &'static str) -> Self {
         Self { shape: ColumnShape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }

@@ -9,6 +9,15 @@ use crate::robot::sequence::Sequence;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
+/// When a row is for a model: by the clock of the recording from which it was identified, or after all that this recording saw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RowTime {
+    /// s of that clock.
+    At(f64),
+    /// Long after that recording: what steps has stepped, and the arm is warm.
+    LongAfter,
+}
+
 /// Measured rows, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
 #[derive(Debug, Clone, Default)]
 pub struct Measurements {
@@ -22,6 +31,9 @@ pub struct Measurements {
     pub current: Option<Vec<f64>>,
     /// s; where no row has one, the number of the row stands for it.
     pub time: Option<Vec<f64>>,
+    /// Whether the model that predicts these rows knows another clock than theirs and was identified long before. Their times then tell what
+    /// lies between them, and nothing else.
+    pub long_after: bool,
     /// Of the arm, C.
     pub temperature: Option<Vec<f64>>,
     /// Circumstances that declared laws read by name, SI: one number a row, or one for each joint.
@@ -72,6 +84,11 @@ impl Measurements {
     /// s from some start, that of the last row that has one where this row has none; without a clock the number of the row, from 0.
     pub fn time(&self, row: usize) -> f64 {
         self.time.as_ref().and_then(|all| nearest(all, row)).unwrap_or(row as f64)
+    }
+
+    /// When a row is for a law of time.
+    pub fn row_time(&self, row: usize) -> RowTime {
+        if self.long_after { RowTime::LongAfter } else { RowTime::At(self.time(row)) }
     }
 
     /// C; that of the last row that has one where this row has none.

@@ -27,7 +27,7 @@ pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
 pub use joint_convention::{CountedCoupling, JointConvention};
 pub use library::{LIBRARY, LibraryArm};
-pub use measurements::Measurements;
+pub use measurements::{Measurements, RowTime};
 pub use memories::Memories;
 pub use memory::Memory;
 pub use model::RobotModel;

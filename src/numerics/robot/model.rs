@@ -1,6 +1,7 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
 use crate::description::{JointKind, RobotDescription};
+use crate::robot::measurements::Measurements;
 use crate::robot::setup::MeasurementSetup;
 use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};
@@ -58,6 +59,11 @@ impl RobotModel {
     /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
     pub fn mounting(&self, target: Option<usize>) -> &Pose {
         target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.mounting)
+    }
+
+    /// How the target that a row measured is mounted on the last body.
+    pub fn mounting_at(&self, data: &Measurements, row: usize) -> &Pose {
+        self.mounting(self.setup.target(data.target(row)))
     }
 
     /// The data that the model was made of.

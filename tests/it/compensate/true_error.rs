@@ -6,7 +6,7 @@ use calib::description::{JointKind, RobotDescription};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
-use calib::robot::RobotModel;
+use calib::robot::{RobotModel, RowTime};
 use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads};
 use calib::table::{Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};
 use calib::twin::arm::Arm;
@@ -201,7 +201,7 @@ impl Cell {
             reach.under(&Circumstance {
                 payload: target.payload_kg,
                 temperature: Some(target.temperature_c),
-                time: target.time_s,
+                time: RowTime::At(target.time_s),
                 direction: target.direction.clone(),
                 current: None,
             });

@@ -1,4 +1,4 @@
-use calib::effect::{EffectContext, EffectStack, Load, whole};
+use calib::effect::{EffectContext, EffectStack, Load, arm_effect};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit, gauge};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
@@ -29,7 +29,7 @@ pub fn identify(robot_file: &str, q: &[Vec<f64>], points: &[[f64; 3]]) -> Result
     let (robot, base) = gauge(robot, &data, &rows, &BTreeMap::new())?;
     let context = EffectContext { base, load: Load::GravityTorque };
     let names = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
-    let effects = names.iter().filter_map(|name| whole(name, &context)).collect();
+    let effects = names.iter().filter_map(|name| arm_effect(name, &context)).collect();
     let nominal = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
     let candidates: Vec<usize> = (0..nominal.x.len()).collect();
     let (model, fitted) = fit(&nominal, &data, &FitOptions { rows: &rows, candidates: &candidates });

@@ -1,4 +1,4 @@
-use calib::effect::{Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use calib::effect::{Axes, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about};
 use calib::robot::RobotModel;
 use calib::units::Unit;
 
@@ -6,16 +6,13 @@ use calib::units::Unit;
 pub struct SeatCompliance;
 
 impl Cause for SeatCompliance {
-    fn about(&self) -> &'static CauseDescription {
-        &CauseDescription {
-            name: "seat_compliance",
-            place: "tool",
-            formula: "the target moves by c times the payload over the largest payload",
-            size: "10 to 200 um",
-            confounded: "payload_error, joint_compliance of the last joints",
-            needs: "rows with and without the payload",
-            ..CauseDescription::PLAIN
-        }
+    about! {
+        name: "seat_compliance",
+        place: "tool",
+        formula: "the target moves by c times the payload over the largest payload",
+        size: "10 to 200 um",
+        confounded: "payload_error, joint_compliance of the last joints",
+        needs: "rows with and without the payload",
     }
 
     /// One hypothesis, where the recording can tell.
@@ -42,7 +39,7 @@ impl Cause for SeatCompliance {
 mod tests {
     use super::*;
     use crate::fixture;
-    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, whole};
+    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, arm_effect};
     use calib::estimate::{FitOptions, Model, fit};
     use calib::robot::{Measurements, PointReadings};
     use calib::spatial::{Pose, Twist};
@@ -70,7 +67,7 @@ mod tests {
         };
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.1, 2.0));
         let setting = EffectContext { base, load: Load::GravityTorque };
-        let effects: Vec<Box<dyn Effect>> = vec![whole("base_frame", &setting).expect("a cause"), Box::new(form.clone())];
+        let effects: Vec<Box<dyn Effect>> = vec![arm_effect("base_frame", &setting).expect("a cause"), Box::new(form.clone())];
         let start = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
         let mut truth = start.clone();
         let first = truth.x.len() - 3;

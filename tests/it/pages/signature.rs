@@ -1,7 +1,7 @@
 //! A line of blocks for each cause: how the measured point moves while a joint sweeps.
 
 use crate::fixture;
-use calib::effect::{CAUSES, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, whole};
+use calib::effect::{CAUSES, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, arm_effect};
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -101,7 +101,7 @@ fn line(robot: &RobotModel, effect: Box<dyn Effect>, place: Place) -> Option<Str
     let data = sweep(robot, joint);
     let base = setting().base;
     // Errors of the torque model move nothing but through joints that yield.
-    let yields = whole("joint_compliance", &setting()).expect("a cause");
+    let yields = arm_effect("joint_compliance", &setting()).expect("a cause");
     let alone = effect.name() == yields.name();
     let stack = EffectStack::new(robot, base, if alone { vec![effect] } else { vec![yields, effect] });
     let specs = stack.specs();

@@ -1,10 +1,12 @@
 //! Dry friction that torques show says on which side of a gap a joint comes to rest: both recordings of an arm in one pipeline.
 
 use super::masses::table;
-use super::results::{arm, calib};
+use super::results::{Solved, arm, calib};
 use super::write;
-use calib::table::{FindingNumbers, Findings};
+use calib::table::{Document, FindingNumbers, Findings, VerdictSentences};
+use calib::twin::torque::TorqueCase;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Joint that has lost motion, from 1, and its whole gap, arcsec.
 const JOINT: usize = 3;
@@ -44,6 +46,9 @@ stages:
     reads: {robot: truth}
   - id: together
     uses: diagnose
+  - uses: validate
+  - uses: report
+  - uses: report_torques
 "#;
 
 /// What a diagnosis says of the gap; half of it with its standard deviation, arcsec.
@@ -56,22 +61,63 @@ fn gap(store: &Path, stage: &str) -> (String, [f64; 2]) {
     (found.statement, [half.value, half.sigma.expect("its sigma")])
 }
 
+/// The arm, and the pipeline that was run on it.
+fn solved() -> &'static Solved {
+    static SOLVED: OnceLock<Solved> = OnceLock::new();
+    SOLVED.get_or_init(|| {
+        let solved = Solved { folder: tempfile::tempdir().expect("a folder"), case: arm() };
+        write(&solved.path("case"), &solved.case.recording());
+        let text = PIPELINE.replace("GAP", &GAP.to_string()).replace("FRICTION", &friction(&solved.case).to_string());
+        std::fs::write(solved.path("pipeline.yaml"), text).expect("a file");
+        let output = calib(&["run", "--quiet", &solved.path("pipeline.yaml").display().to_string()], &solved.path("store"));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        solved
+    })
+}
+
+/// Nm.
+fn friction(case: &TorqueCase) -> f64 {
+    case.plain_friction()[JOINT - 1][1].expect("friction")
+}
+
 #[test]
 fn a_gap_whose_side_the_loads_seem_to_decide_is_left_to_approach_below_the_friction_of_the_torques() {
-    let case = arm();
-    let friction = case.plain_friction()[JOINT - 1][1].expect("friction");
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    write(&at("case"), &case.recording());
-    let text = PIPELINE.replace("GAP", &GAP.to_string()).replace("FRICTION", &friction.to_string());
-    std::fs::write(at("pipeline.yaml"), text).expect("a file");
-    let output = calib(&["run", "--quiet", &at("pipeline.yaml").display().to_string()], &at("store"));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let [(alone, before), (together, after)] = ["alone", "together"].map(|stage| gap(&at("store"), stage));
+    let (store, friction) = (solved().path("store"), friction(&solved().case));
+    let [(alone, before), (together, after)] = ["alone", "together"].map(|stage| gap(&store, stage));
     println!("friction {friction:.2} Nm; alone: {alone} {before:.2?}; together: {together} {after:.2?}");
     assert!(!alone.contains("approach"), "{alone}");
     let said = together.split(" Nm").next().and_then(|text| text.rsplit(' ').next()).expect("Nm");
     assert!((said.parse::<f64>().expect("a number") / friction - 1.0).abs() < 0.03, "{together}");
     let [half, sigma] = after;
     assert!((half - 0.5 * GAP).abs() < 3.0 * sigma && sigma <= before[1], "{after:?}, {before:?}");
+}
+
+#[test]
+fn each_page_of_a_pipeline_says_what_its_own_diagnosis_says() {
+    let store = solved().path("store");
+    let said = |stage: &str| -> Vec<String> {
+        let VerdictSentences(rows) = table(&store, &format!("{stage}/sentences"));
+        assert!(rows.iter().all(|row| row.step == stage), "{stage}");
+        rows.into_iter().map(|row| row.sentence).collect()
+    };
+    let page = |stage: &str| -> String {
+        let Document(rows) = table(&store, &format!("{stage}/document"));
+        let page = rows.into_iter().find(|row| row.name.ends_with(".html")).expect("a page");
+        [("&#x27;", "'"), ("&#x2f;", "/"), ("&lt;", "<"), ("&gt;", ">")]
+            .iter()
+            .fold(page.content, |text, (a, b)| text.replace(a, b))
+    };
+    let (points, torques) = (said("together"), said("diagnose_torques"));
+    println!("points: {points:#?}\ntorques: {torques:#?}");
+    assert!(!points.is_empty() && !torques.is_empty());
+    let (of_points, of_torques) = (page("report"), page("report_torques"));
+    for sentence in &torques {
+        assert!(of_torques.contains(sentence), "{sentence} is not on its page");
+        assert!(points.contains(sentence) || !of_points.contains(sentence), "{sentence} is on the page of the points");
+    }
+    let shown = |sentence: &&String| of_points.contains(sentence.as_str());
+    assert!(points.iter().any(|sentence| shown(&sentence)), "nothing of {points:?} is on its page");
+    for sentence in points.iter().filter(|sentence| !torques.contains(sentence)) {
+        assert!(!of_torques.contains(sentence), "{sentence} is on the page of the torques");
+    }
 }

@@ -6,7 +6,7 @@ use super::noise::{JointSpread, RepeatPairs, by_residual};
 use crate::criteria::noise::{ESTIMATES, GEOMETRY, REPEATS, SETTLED, SLOW};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, names, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, arm_effect, names};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use std::ops::Range;
@@ -239,7 +239,7 @@ pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Ve
     // The base starts where it was found, so that its correction is too small to matter to what else moves it.
     let setting = EffectContext { base: from.base(), load: Load::GravityTorque };
     let base = || from.stack.effects().filter(|(effect, _)| effect.form().is_none());
-    let again = base().filter_map(|(effect, _)| whole(effect.name(), &setting));
+    let again = base().filter_map(|(effect, _)| arm_effect(effect.name(), &setting));
     let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
     let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
     let mut model = Model::nominal(from.robot.clone(), stack);

@@ -1,21 +1,18 @@
 //! Friction that is greater in one direction of motion.
 
-use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Friction that is greater in one direction of motion.
 pub(super) struct Asymmetric;
 
 impl TorqueCause for Asymmetric {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "asymmetric_friction",
-            coefficients: &[("asymmetry", "Nm")],
-            of_sign: true,
-            rich: true,
-            modifies: &[COULOMB],
-            ..PLAIN
-        }
+    about! {
+        name: "asymmetric_friction",
+        coefficients: &[("asymmetry", "Nm")],
+        of_sign: true,
+        rich: true,
+        modifies: &[COULOMB],
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

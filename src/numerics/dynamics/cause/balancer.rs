@@ -1,7 +1,7 @@
 //! A balancer at the joint that arms balance: its torque swings with the joint's angle.
 
 use super::spring::{BALANCED, SPRING_BALANCE_NAME};
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Shape: least and greatest angle of the joint, rad. Between two points a spring's lever is a sine of the angle: one wave a turn; where its force grows with its stroke (gas, a bent lever)
@@ -14,19 +14,16 @@ const WIDTHS: [usize; 2] = [2, 5];
 const CHECKED: usize = 8;
 const LEAST_WHOLE: f64 = 0.4;
 
-/// Of an angle, column by column.
+/// The waves of an angle, column by column.
 fn waves(q: f64) -> [f64; 5] {
     [q.cos(), q.sin(), (2.0 * q).cos(), (2.0 * q).sin(), 1.0]
 }
 
 impl TorqueCause for Balancer {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: SPRING_BALANCE_NAME,
-            coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")],
-            of_angle: true,
-            ..PLAIN
-        }
+    about! {
+        name: SPRING_BALANCE_NAME,
+        coefficients: &[("cosine", "Nm"), ("sine", "Nm"), ("second_cosine", "Nm"), ("second_sine", "Nm"), ("constant", "Nm")],
+        of_angle: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

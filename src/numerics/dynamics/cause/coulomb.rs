@@ -1,6 +1,6 @@
 //! Friction of one size against the direction of motion.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -10,15 +10,12 @@ pub const COULOMB: &str = "coulomb_friction";
 pub(super) struct Coulomb;
 
 impl TorqueCause for Coulomb {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: COULOMB,
-            coefficients: &[("coulomb", "Nm")],
-            price: 0.0,
-            of_sign: true,
-            rich: true,
-            ..PLAIN
-        }
+    about! {
+        name: COULOMB,
+        coefficients: &[("coulomb", "Nm")],
+        price: 0.0,
+        of_sign: true,
+        rich: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

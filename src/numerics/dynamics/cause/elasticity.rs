@@ -1,6 +1,6 @@
 //! A joint that swings: its torque is that of the rigid arm behind a resonance.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, plain, shape};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use std::f64::consts::PI;
@@ -21,14 +21,11 @@ const HERTZ: [f64; 8] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0];
 const DAMPING: [f64; 2] = [0.05, 0.15];
 
 impl TorqueCause for Elasticity {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "joint_elasticity",
-            coefficients: &[("share", "1"), ("transmitted_damping", "1")],
-            price: 8.0,
-            of_rigid: true,
-            ..PLAIN
-        }
+    about! {
+        name: "joint_elasticity",
+        coefficients: &[("share", "1"), ("transmitted_damping", "1")],
+        price: 8.0,
+        of_rigid: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! A base that does not stand as declared.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, shape};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, shape};
 use crate::dynamics::scene::{DynamicScene, GRAVITY};
 use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
@@ -9,16 +9,13 @@ use crate::effect::Place;
 pub(super) struct GravityDirection;
 
 impl TorqueCause for GravityDirection {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "gravity_direction",
-            coefficients: &[("side_x", "1"), ("side_y", "1")],
-            price: 4.0,
-            rich: true,
-            inertial: true,
-            of_rigid: true,
-            ..PLAIN
-        }
+    about! {
+        name: "gravity_direction",
+        coefficients: &[("side_x", "1"), ("side_y", "1")],
+        price: 4.0,
+        rich: true,
+        inertial: true,
+        of_rigid: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! A link whose centre of mass is elsewhere.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -14,9 +14,7 @@ const WIDTH: usize = 3;
 const FARTHEST: f64 = 0.2;
 
 impl TorqueCause for WrongLinkCentre {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: "link_com", price: 8.0, inertial: true, ..PLAIN }
-    }
+    about! { name: "link_com", price: 8.0, inertial: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&WrongLinkCentre, scene, WIDTH)

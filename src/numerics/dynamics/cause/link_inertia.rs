@@ -1,6 +1,6 @@
 //! A link whose inertia is not the declared one.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -12,9 +12,7 @@ pub(super) struct WrongLinkInertia;
 const WIDTH: usize = 6;
 
 impl TorqueCause for WrongLinkInertia {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: "link_inertia", price: 8.0, inertial: true, ..PLAIN }
-    }
+    about! { name: "link_inertia", price: 8.0, inertial: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&WrongLinkInertia, scene, WIDTH)

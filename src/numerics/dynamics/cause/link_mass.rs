@@ -1,6 +1,6 @@
 //! A link that is heavier or lighter than declared.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_link, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_link, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -10,14 +10,12 @@ use crate::dynamics::types::TorqueParameter;
 pub(super) struct HeavierLink;
 
 const WIDTH: usize = 1;
-/// Of the declared mass: more is no error of a declaration.
+/// Share of the declared mass: what errs by more is no error of a declaration.
 const LEAST: f64 = -0.7;
 const MOST: f64 = 1.0;
 
 impl TorqueCause for HeavierLink {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: "link_mass", inertial: true, ..PLAIN }
-    }
+    about! { name: "link_mass", inertial: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_link(&HeavierLink, scene, WIDTH)

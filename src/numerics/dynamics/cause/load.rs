@@ -1,23 +1,20 @@
 //! Friction that grows with the torque that a gear transmits.
 
-use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Friction that grows with the torque that a gear transmits.
 pub(super) struct LoadFriction;
 
 impl TorqueCause for LoadFriction {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "load_friction",
-            coefficients: &[("share", "1")],
-            of_sign: true,
-            rich: true,
-            modifies: &[COULOMB],
-            positive: true,
-            of_rigid: true,
-            ..PLAIN
-        }
+    about! {
+        name: "load_friction",
+        coefficients: &[("share", "1")],
+        of_sign: true,
+        rich: true,
+        modifies: &[COULOMB],
+        positive: true,
+        of_rigid: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

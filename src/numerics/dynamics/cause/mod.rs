@@ -129,6 +129,16 @@ const PLAIN: TorqueCauseDescription = TorqueCauseDescription {
     may_repeat: false,
 };
 
+/// Writes what a cause is: what it does not say is as of most causes.
+macro_rules! about {
+    ($($field:ident: $value:expr),+ $(,)?) => {
+        fn about(&self) -> &'static $crate::dynamics::cause::TorqueCauseDescription {
+            &$crate::dynamics::cause::TorqueCauseDescription { $($field: $value,)+ ..$crate::dynamics::cause::PLAIN }
+        }
+    };
+}
+use about;
+
 /// A physical reason why measured torques differ from those of the rigid arm.
 pub(super) trait TorqueCause: Sync {
     /// What it is.
@@ -217,7 +227,7 @@ pub(super) struct TorqueForm {
 }
 
 impl TorqueForm {
-    /// Of a joint, without shape numbers.
+    /// A form at a joint, without shape numbers.
     pub fn at_joint(cause: &'static dyn TorqueCause, joint: usize, width: usize) -> Self {
         Self { cause, place: Place::Joint(joint), with: [0; 2], shape: Vec::new(), width }
     }

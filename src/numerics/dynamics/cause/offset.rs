@@ -1,8 +1,6 @@
 //! A constant torque that no mass explains: the zero of a current or torque sensor.
 
-use super::{
-    FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, at_each_joint_with, fill,
-};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -16,13 +14,11 @@ pub(super) struct Offset;
 const TIMES: [f64; 3] = [5.0, USUAL, 45.0];
 /// s, of the form that stands in the rich model.
 const USUAL: f64 = 15.0;
-/// Of the recording: a zero that moves for longer is one that stays.
+/// Share of the recording: a zero that moves for longer is one that stays.
 const LONGEST: f64 = 0.45;
 
 impl TorqueCause for Offset {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true, ..PLAIN }
-    }
+    about! { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let longest = LONGEST * scene.duration();

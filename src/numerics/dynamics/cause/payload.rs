@@ -1,6 +1,6 @@
 //! A payload that is not the declared one.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, plain};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, plain};
 use crate::dynamics::inertials::DeclaredInertials;
 use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
 use crate::dynamics::scene::DynamicScene;
@@ -20,9 +20,7 @@ const OTHERS: [&str; 9] =
 const WIDTHS: [usize; 3] = [1, 4, INERTIAL_NUMBERS];
 
 impl TorqueCause for Payload {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: "payload_error", price: 4.0, rich: true, inertial: true, ..PLAIN }
-    }
+    about! { name: "payload_error", price: 4.0, rich: true, inertial: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let mass = scene.arm.payload.map_or(0.0, |payload| payload.mass);

@@ -1,6 +1,6 @@
 //! Friction that turns with the direction of motion only after a travel, and is kept at rest.
 
-use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
 
 /// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968).
@@ -13,16 +13,13 @@ const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL], &[0.01], &[0.025]]
 const REST: f64 = 2e-3;
 
 impl TorqueCause for PreslidingFriction {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "presliding_friction",
-            coefficients: &[("kept", "Nm")],
-            price: 25.0,
-            of_sign: true,
-            modifies: &[COULOMB],
-            positive: true,
-            ..PLAIN
-        }
+    about! {
+        name: "presliding_friction",
+        coefficients: &[("kept", "Nm")],
+        price: 25.0,
+        of_sign: true,
+        modifies: &[COULOMB],
+        positive: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill, shape};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, fill, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -21,14 +21,11 @@ impl Ripple {
 }
 
 impl TorqueCause for Ripple {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "torque_ripple",
-            coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
-            may_repeat: true,
-            of_angle: true,
-            ..PLAIN
-        }
+    about! {
+        name: "torque_ripple",
+        coefficients: &[("cosine", "Nm"), ("sine", "Nm")],
+        may_repeat: true,
+        of_angle: true,
     }
 
     /// As common as other causes, over all orders together.
@@ -80,7 +77,7 @@ impl TorqueCause for Ripple {
     }
 }
 
-/// Of a cosine and a sine, with its standard deviation.
+/// The amplitude of a cosine and a sine, with its standard deviation.
 fn amplitude(fitted: &[FittedNumber]) -> (f64, f64) {
     let amplitude = fitted[0].value.hypot(fitted[1].value);
     let weighted = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma);

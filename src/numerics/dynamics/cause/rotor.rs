@@ -1,6 +1,6 @@
 //! Inertia of a motor and its gear, as the joint feels it.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, at_each_joint};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -10,16 +10,13 @@ pub(in crate::dynamics) const ROTOR: &str = "rotor_inertia";
 pub(super) struct Rotor;
 
 impl TorqueCause for Rotor {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: ROTOR,
-            coefficients: &[("inertia", "kg m2")],
-            price: 2.0,
-            rich: true,
-            inertial: true,
-            positive: true,
-            ..PLAIN
-        }
+    about! {
+        name: ROTOR,
+        coefficients: &[("inertia", "kg m2")],
+        price: 2.0,
+        rich: true,
+        inertial: true,
+        positive: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

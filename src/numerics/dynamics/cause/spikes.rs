@@ -1,6 +1,6 @@
 //! Lost motion: a knock after each reversal of a joint.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
 
 /// (t / T) exp(1 - t / T) after a reversal, with the new direction's sign.
@@ -15,9 +15,7 @@ const REST: f64 = 0.006;
 const OVER: f64 = 20.0;
 
 impl TorqueCause for Spikes {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: "backlash_spikes", coefficients: &[("height", "Nm")], price: 25.0, ..PLAIN }
-    }
+    about! { name: "backlash_spikes", coefficients: &[("height", "Nm")], price: 25.0 }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Spikes, scene, 1, &TIMES)

@@ -1,6 +1,6 @@
 //! Friction that is greater at low speed and falls as the joint gets faster.
 
-use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, fill};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// sgn v exp(-|v| / vs) (Armstrong-Helouvry, 1994).
@@ -12,19 +12,16 @@ const USUAL: f64 = 0.1;
 const NARROWEST: f64 = 2.0;
 const SPEEDS: [&[f64]; 8] =
     [&[0.05, 1.0], &[0.07, 1.0], &[USUAL, 1.0], &[0.15, 1.0], &[0.25, 1.0], &[0.06, 2.0], &[USUAL, 2.0], &[0.17, 2.0]];
-/// Of speed over its scale: 1 as a rule, found between these (Armstrong-Helouvry, 1991, reports 0.5 to 2).
+/// Exponent of speed over its scale: 1 as a rule, found between these (Armstrong-Helouvry, 1991, reports 0.5 to 2).
 const EXPONENTS: [f64; 2] = [0.4, 2.5];
 
 impl TorqueCause for Stribeck {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "stribeck_friction",
-            coefficients: &[("stribeck", "Nm")],
-            of_sign: true,
-            modifies: &[COULOMB],
-            positive: true,
-            ..PLAIN
-        }
+    about! {
+        name: "stribeck_friction",
+        coefficients: &[("stribeck", "Nm")],
+        of_sign: true,
+        modifies: &[COULOMB],
+        positive: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -66,7 +63,7 @@ impl TorqueCause for Stribeck {
     }
 }
 
-/// Of what it is when the joint begins to move.
+/// The share that is left at a velocity of what it is when the joint begins to move.
 fn falls(form: &TorqueForm, velocity: f64) -> f64 {
     let speeds = velocity.abs() / form.shape[0];
     match form.shape.get(1) {

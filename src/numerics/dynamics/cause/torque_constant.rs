@@ -1,13 +1,13 @@
 //! A current that makes another torque than declared.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint, fill};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) struct TorqueConstant;
 
-/// Of the largest torque.
+/// Shares of the largest torque.
 const HALVES: [f64; 2] = [0.25, 1.0];
 const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 
@@ -15,14 +15,11 @@ const HALF_SPAN: [f64; 2] = [0.1, 4.0];
 const MOST: f64 = 0.6;
 
 impl TorqueCause for TorqueConstant {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "torque_constant",
-            coefficients: &[("relative", "1")],
-            inertial: true,
-            of_rigid: true,
-            ..PLAIN
-        }
+    about! {
+        name: "torque_constant",
+        coefficients: &[("relative", "1")],
+        inertial: true,
+        of_rigid: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! What has no name: a smooth torque at a joint, in the angles of two joints.
 
-use super::{FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill};
+use super::{FittedNumber, TorqueCause, TorqueForm, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -10,15 +10,12 @@ pub(in crate::dynamics) const UNKNOWN: &str = "unknown";
 pub(super) struct Unnamed;
 
 impl TorqueCause for Unnamed {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: UNKNOWN,
-            coefficients: &[("sin_sin", "Nm"), ("sin_cos", "Nm"), ("cos_sin", "Nm"), ("cos_cos", "Nm")],
-            price: 30.0,
-            may_repeat: true,
-            alike_at_joints: true,
-            ..PLAIN
-        }
+    about! {
+        name: UNKNOWN,
+        coefficients: &[("sin_sin", "Nm"), ("sin_cos", "Nm"), ("cos_sin", "Nm"), ("cos_cos", "Nm")],
+        price: 30.0,
+        may_repeat: true,
+        alike_at_joints: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,7 +1,7 @@
 //! Friction without a name that is greater at some angles of its joint: ways, seals and lubricant differ along a turn.
 
 use super::unknown::UNKNOWN;
-use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, fill, plain};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, about, fill, plain};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -12,16 +12,13 @@ pub(super) struct UnnamedDrag;
 const ORDERS: usize = 4;
 
 impl TorqueCause for UnnamedDrag {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: UNKNOWN,
-            coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
-            price: 30.0,
-            of_sign: true,
-            modifies: &[COULOMB],
-            may_repeat: true,
-            ..PLAIN
-        }
+    about! {
+        name: UNKNOWN,
+        coefficients: &[("drag_cosine", "Nm"), ("drag_sine", "Nm")],
+        price: 30.0,
+        of_sign: true,
+        modifies: &[COULOMB],
+        may_repeat: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,7 +1,7 @@
 //! Friction without a name: a smooth curve of speed beside viscous and Coulomb friction.
 
 use super::unknown::UNKNOWN;
-use super::{COULOMB, FittedNumber, PLAIN, TorqueCause, TorqueCauseDescription, TorqueForm, VISCOUS, fill};
+use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, VISCOUS, about, fill};
 use crate::dynamics::scene::DynamicScene;
 use std::f64::consts::PI;
 
@@ -9,16 +9,13 @@ use std::f64::consts::PI;
 pub(super) struct UnnamedFriction;
 
 impl TorqueCause for UnnamedFriction {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: UNKNOWN,
-            coefficients: &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")],
-            price: 30.0,
-            of_sign: true,
-            modifies: &[VISCOUS, COULOMB],
-            may_repeat: true,
-            ..PLAIN
-        }
+    about! {
+        name: UNKNOWN,
+        coefficients: &[("half_wave_sin", "Nm"), ("half_wave_cos", "Nm"), ("wave_sin", "Nm"), ("wave_cos", "Nm")],
+        price: 30.0,
+        of_sign: true,
+        modifies: &[VISCOUS, COULOMB],
+        may_repeat: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,7 +1,7 @@
 //! Drag without a name that turns over only after a travel of a good part of a radian: hoses and cable guides that bend with their joint.
 
 use super::unknown::UNKNOWN;
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with};
 use crate::dynamics::scene::DynamicScene;
 
 /// Exponential over a travel after each reversal, kept at rest; shape: travel, least and greatest one, rad.
@@ -12,15 +12,12 @@ const SPAN: [f64; 2] = [0.05, 1.0];
 const TRAVELS: [f64; 3] = [0.08, 0.2, 0.5];
 
 impl TorqueCause for UnnamedHysteresis {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: UNKNOWN,
-            coefficients: &[("kept", "Nm")],
-            price: 30.0,
-            positive: true,
-            may_repeat: true,
-            ..PLAIN
-        }
+    about! {
+        name: UNKNOWN,
+        coefficients: &[("kept", "Nm")],
+        price: 30.0,
+        positive: true,
+        may_repeat: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

@@ -1,6 +1,6 @@
 //! Friction that grows with the velocity of a joint.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, at_each_joint_with, fill};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint_with, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// Its name.
@@ -13,9 +13,7 @@ pub(super) struct Viscous;
 const EXPONENTS: [f64; 2] = [0.4, 1.6];
 
 impl TorqueCause for Viscous {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true, ..PLAIN }
-    }
+    about! { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Viscous, scene, 1, &[&[1.0]])
@@ -54,7 +52,7 @@ fn exponent(form: &TorqueForm) -> Option<f64> {
     form.shape.first().copied().filter(|exponent| *exponent != 1.0)
 }
 
-/// Of a velocity, with its sign.
+/// The power of a velocity, with its sign.
 fn power(form: &TorqueForm, velocity: f64) -> f64 {
     exponent(form).map_or(velocity, |exponent| velocity.signum() * velocity.abs().powf(exponent))
 }

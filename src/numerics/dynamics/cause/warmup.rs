@@ -1,6 +1,6 @@
 //! Friction that falls while the gear warms up.
 
-use super::{COULOMB, FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, VISCOUS, fill};
+use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
 /// exp(-t / T) times velocity and its sign; shape: T and the longest of it, `with` marks the form that stands in the rich model.
@@ -8,20 +8,17 @@ pub(super) struct Warmup;
 
 /// s.
 const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];
-/// Of the recording: what lasts longer is friction that stays.
+/// Share of the recording: what lasts longer is friction that stays.
 const LONGEST: f64 = 0.45;
 /// s, the longest that stands in the rich model.
 const USUAL: f64 = 18.0;
 
 impl TorqueCause for Warmup {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "warmup_friction",
-            coefficients: &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")],
-            of_sign: true,
-            modifies: &[VISCOUS, COULOMB],
-            ..PLAIN
-        }
+    about! {
+        name: "warmup_friction",
+        coefficients: &[("viscous_cold", "Nm s/rad"), ("coulomb_cold", "Nm")],
+        of_sign: true,
+        modifies: &[VISCOUS, COULOMB],
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

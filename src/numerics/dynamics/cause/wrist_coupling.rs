@@ -1,6 +1,6 @@
 //! Gears of a wrist that turn with two joints: friction of the sum of two velocities, felt by both.
 
-use super::{FittedNumber, PLAIN, ShapeSpan, TorqueCause, TorqueCauseDescription, TorqueForm, plain, shape};
+use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, plain, shape};
 use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 
@@ -18,14 +18,11 @@ const LEAST_RATIO: f64 = 0.15;
 const WRIST: usize = 3;
 
 impl TorqueCause for WristCoupling {
-    fn about(&self) -> &'static TorqueCauseDescription {
-        &TorqueCauseDescription {
-            name: "wrist_coupling",
-            coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
-            of_sign: true,
-            positive: true,
-            ..PLAIN
-        }
+    about! {
+        name: "wrist_coupling",
+        coefficients: &[("viscous", "Nm s/rad"), ("coulomb", "Nm")],
+        of_sign: true,
+        positive: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {

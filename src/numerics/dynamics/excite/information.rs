@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 const SIGN_WIDTH: f64 = 0.01;
 /// Hz.
 const CUTOFF: f64 = 5.0;
-/// Of a column's information: added to the diagonal so that what is not seen at all is infinitely bad only in proportion.
+/// Share of a column's information that is added to the diagonal, so that what is not seen at all is infinitely bad only in proportion.
 const FLOOR: f64 = 1e-12;
 
 /// Whose parameters, and how noisy torques are.
@@ -27,7 +27,7 @@ pub(super) struct Information<'a> {
     pub noise: &'a [f64],
 }
 
-/// Of a motion: scaled to ones on the diagonal, and the scales.
+/// The information of a motion, scaled to ones on the diagonal, and the scales.
 pub(super) struct MotionInformation {
     scaled: DMatrix<f64>,
     scale: DVector<f64>,
@@ -43,7 +43,7 @@ pub(super) fn base_of(arm: &DynamicArm, basis: &SeriesBasis, series: &JointSerie
 }
 
 impl Information<'_> {
-    /// Of some rows of a motion, each standing for `share` recorded ones.
+    /// The information of some rows of a motion, each standing for `share` recorded ones.
     pub fn of(&self, basis: &SeriesBasis, series: &JointSeries, rows: &[usize], share: f64) -> MotionInformation {
         let (n, masses) = (self.arm.joints(), self.base.len());
         let width = masses + 2 * n;
@@ -99,7 +99,7 @@ impl MotionInformation {
         self.inflations().iter().zip(&self.scale).map(|(inflation, scale)| inflation.sqrt() / scale).collect()
     }
 
-    /// Of the regressor with columns of one length.
+    /// Condition of the regressor with columns of one length.
     pub fn condition(&self) -> f64 {
         let values = self.scaled.symmetric_eigenvalues();
         (values.max() / values.min().max(f64::MIN_POSITIVE)).sqrt()

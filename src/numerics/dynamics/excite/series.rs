@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 const RAMP: f64 = 1.0;
 /// s: a period is not longer.
 const PERIOD: f64 = 10.0;
-/// Of a limit: what is used of it.
+/// Share of a limit that is used.
 const USED: f64 = 0.98;
 
 /// What a joint may do.

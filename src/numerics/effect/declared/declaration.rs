@@ -21,7 +21,7 @@ pub struct EffectDeclaration {
     /// Numbers within the formulas that are refined.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shape: BTreeMap<String, ShapeRange>,
-    /// Of the coefficients; `None`: that of the motion.
+    /// Unit of the coefficients; `None`: that of the motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// What the formulas are in, in words, e.g. `K rad`: stands behind the unit in the sentence.

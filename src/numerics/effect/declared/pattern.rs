@@ -18,7 +18,7 @@ pub struct DeclaredPattern {
     /// Names of the shape numbers, in the order of their positions.
     pub names: Vec<String>,
     pub shape: Vec<ShapeRange>,
-    /// Of the coefficients, where it is stated.
+    /// Unit of the coefficients, where it is stated.
     pub unit: Option<Unit>,
     /// The usual size of a coefficient, SI, where it is stated.
     pub size: Option<f64>,

@@ -22,14 +22,14 @@ pub enum Constant {
     Shape(usize),
 }
 
-/// Of which joint (from 0) a quantity is.
+/// To which joint (from 0) a quantity belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Whose {
     Own,
     Next,
     Before,
     Joint(usize),
-    /// Of the whole row.
+    /// To none: it is one of the whole row.
     Row,
 }
 

@@ -8,7 +8,7 @@ use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::Site;
 use super::{median, random_sets, subset};
 use crate::criteria::choose::{OFF, POSTURES};
-use crate::effect::{EffectContext, EffectStack, Load, names, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect, names};
 use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
@@ -25,9 +25,9 @@ use rand::{RngExt, SeedableRng};
 pub struct PriorSigma {
     /// E.g. `link_geometry.`.
     pub begins: &'static str,
-    /// Of names that end with a rotation.
+    /// Sigma of parameters whose names end with a rotation.
     pub turns: f64,
-    /// Of all others.
+    /// Sigma of all other parameters.
     pub others: f64,
 }
 
@@ -74,7 +74,7 @@ pub struct BallOffset {
 pub struct BroughtProposal {
     /// The joints at which the ball lies in the sockets; positions are these.
     pub poses: Measurements,
-    /// Of each row, from 0.
+    /// The socket of each row, from 0.
     pub socket: Vec<usize>,
     /// Names and positions of the parameters are its stack's.
     pub model: Model,
@@ -108,7 +108,8 @@ fn model(robot: &RobotModel, places: &[Vector3<f64>], ball: Option<Vector3<f64>>
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let probe = Measurements { joints: robot.joints(), q: vec![0.0; robot.joints()], ..socketed(vec![0], 1.0) };
     let effects = [names::ANCHOR, names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY, names::JOINT_COMPLIANCE];
-    let made = effects.iter().filter_map(|name| whole(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
+    let made =
+        effects.iter().filter_map(|name| arm_effect(name, &setting)).filter(|effect| effect.missing(&robot, &probe).is_none());
     Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, made.collect()))
 }
 
@@ -249,7 +250,7 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
     tried.filter_map(one).collect()
 }
 
-/// Of the `count` directions of the geometry that are seen best, the standard deviations (m or rad, ascending), without any prior.
+/// Standard deviations (m or rad, ascending) of the `count` directions of the geometry that are seen best, without any prior.
 fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
     let specs = model.stack.specs();
     let own = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));

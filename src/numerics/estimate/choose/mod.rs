@@ -62,7 +62,7 @@ pub struct Proposal {
     pub approach_seen: f64,
     /// Parameters that poses can tell, last the effects to separate.
     pub jacobian: PointJacobian,
-    /// Of the chosen poses.
+    /// Score of the chosen poses.
     pub score: Score,
     /// The same for random sets of as many poses.
     pub random: Vec<Score>,

@@ -147,7 +147,7 @@ impl PointJacobian {
         Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: at(0.5) }
     }
 
-    /// Of [`Self::rows`]: the log determinant of what is left of the last `count` parameters when all others were fitted, and their
+    /// The log determinant of what [`Self::rows`] leave of the last `count` parameters when all others were fitted, and their
     /// sigmas (SI).
     pub(super) fn remainder(&self, rows: &Mat<f64>, count: usize) -> (f64, Vec<f64>) {
         let p = self.free.len();

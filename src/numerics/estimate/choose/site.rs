@@ -26,7 +26,7 @@ pub struct Site {
 pub struct Circumstances {
     /// s on the recording's clock.
     pub time: Option<f64>,
-    /// Of the arm, C.
+    /// Temperature of the arm, C.
     pub temperature: Option<f64>,
     /// The target that is measured, where there are several.
     pub target: Option<String>,

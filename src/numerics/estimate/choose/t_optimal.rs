@@ -38,7 +38,7 @@ pub struct Alternative {
 
 /// What poses would tell; of each pair the first is L where the first explanation is true.
 pub struct Discrimination {
-    /// Of the recorded rows alone.
+    /// L of the recorded rows alone.
     pub before: [f64; 2],
     /// Whether the other does the same at every allowed pose.
     pub alike: [bool; 2],
@@ -63,7 +63,7 @@ pub struct Proposed {
 /// Explanations whose L is below this cannot be separated.
 pub const MIN_SEPARATION_L: f64 = 25.0;
 
-/// Of a squared effect less than this is rounding and second order.
+/// What is left of a squared effect below this share is rounding and second order.
 const NOTHING: f64 = 1e-6;
 
 /// One explanation as the truth, the other fitted.

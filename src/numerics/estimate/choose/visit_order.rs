@@ -1,7 +1,7 @@
 //! How to drive the poses: payload by payload along a short path, and from which side each joint comes to rest.
 
 use super::point_jacobian::PointJacobian;
-use crate::effect::{EffectContext, EffectStack, Load, whole};
+use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
 use crate::estimate::model::Model;
 use crate::estimate::triangle::{axpy, dot};
 use crate::robot::Measurements;
@@ -109,7 +109,7 @@ pub(super) fn approach(model: &Model, jacobian: &PointJacobian, poses: &Measurem
 /// Derivatives of the points by the joint positions over sigma; row-major, 3 rows a pose.
 fn turns(model: &Model, poses: &Measurements) -> Vec<f64> {
     let setting = EffectContext { base: *model.stack.base(), load: Load::GravityTorque };
-    let effects = whole("joint_offset", &setting).into_iter().collect();
+    let effects = arm_effect("joint_offset", &setting).into_iter().collect();
     let stack = EffectStack::new(&model.robot, setting.base, effects);
     let (mut scratch, x) = (stack.scratch(&model.robot), vec![0.0; stack.specs().len()]);
     let mut out = vec![0.0; 3 * poses.rows() * poses.joints];

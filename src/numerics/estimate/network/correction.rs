@@ -60,7 +60,7 @@ pub fn features(prismatic: &[bool], sin_cos: bool, payload: bool) -> Vec<Feature
 /// Linear scaling: `scaled = (value - mean) / scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaling {
-    /// Of the training rows.
+    /// Mean of the training rows.
     pub mean: f64,
     /// Standard deviation of the training rows.
     pub scale: f64,
@@ -85,7 +85,7 @@ impl Scaling {
 pub struct NetworkScaling {
     /// Inputs, in order.
     pub features: Vec<Feature>,
-    /// Of each input.
+    /// Scaling of each input.
     pub inputs: Vec<Scaling>,
     /// m.
     pub outputs: [Scaling; OUTPUTS],

@@ -23,7 +23,7 @@ pub struct DescentIteration {
     pub train: [f64; OUTPUTS],
     /// Mean squares of each output at the check rows, where there are some.
     pub check: Option<[f64; OUTPUTS]>,
-    /// Of the loss, so far.
+    /// Evaluations of the loss so far.
     pub evaluations: u64,
 }
 

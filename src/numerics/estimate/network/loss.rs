@@ -14,13 +14,13 @@ use pulp::{Arch, Simd, WithSimd};
 #[derive(Debug, Clone, Default)]
 pub struct Batch {
     rows: usize,
-    /// Of each block, a column per input.
+    /// Inputs of each block, a column per input.
     inputs: Vec<BlockColumn>,
     /// Largest size of each input.
     largest: Vec<f64>,
-    /// Of each block, a column per axis.
+    /// Targets of each block, a column per axis.
     targets: Vec<BlockColumn>,
-    /// Of each block, for each output in turn what it does along each axis. Empty where outputs are the axes.
+    /// What each output in turn does along each axis, block by block. Empty where outputs are the axes.
     ways: Vec<BlockColumn>,
 }
 
@@ -108,7 +108,7 @@ impl LossBuffers {
 /// A shape, the rows it is trained on and the decay: what is minimised.
 #[derive(Debug, Clone, Copy)]
 pub struct Loss<'a> {
-    /// Of the network.
+    /// Sizes of the network's layers.
     pub shape: LayerSizes,
     /// Rows that it is fitted to.
     pub batch: &'a Batch,

@@ -18,7 +18,7 @@ pub struct LayerSizes {
     pub hidden: usize,
     /// Width of the output layer.
     pub outputs: usize,
-    /// Of the hidden layer.
+    /// Activation of the hidden layer.
     pub activation: Activation,
 }
 

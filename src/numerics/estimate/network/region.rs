@@ -44,7 +44,7 @@ impl Valid {
 /// All joints together: Mahalanobis' distance `|F (q - mean)|` of the farthest posture that was seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jointly {
-    /// Of the training rows.
+    /// Mean of the training rows.
     pub mean: Vec<f64>,
     /// Lower triangle of `F`, row by row.
     pub factor: Vec<Vec<f64>>,
@@ -83,7 +83,7 @@ impl Jointly {
 pub struct Region {
     /// By source: the joints, and the payload where it was known in training, be it an input or not.
     pub ranges: Vec<Valid>,
-    /// Of all inputs together, where there are enough rows.
+    /// The region of all inputs together, where there are enough rows.
     pub jointly: Option<Jointly>,
 }
 

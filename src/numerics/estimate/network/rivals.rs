@@ -94,7 +94,7 @@ pub struct RivalContest<'a> {
     pub decays: Vec<f64>,
     /// Numbers of neurons to compare.
     pub hidden: Vec<usize>,
-    /// Of the cross-validation.
+    /// Parts of the cross-validation.
     pub folds: usize,
 }
 
@@ -111,7 +111,7 @@ pub struct JudgedRival {
     pub sigma: f64,
     /// Numbers of one correction, and evaluations of a loss for it; both of the first fold.
     pub numbers: usize,
-    /// Of the loss, in training.
+    /// Evaluations of the loss in training.
     pub evaluations: u64,
     /// Hidden neurons and decay of networks.
     pub settings: Option<(usize, f64)>,

@@ -6,7 +6,7 @@ use crate::robot::pose_groups::{NEAR, grouped};
 /// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
 #[derive(Debug, Clone, Default)]
 pub struct TrainingSamples {
-    /// Of each row: joints (rad or m), then payload (kg).
+    /// Inputs of each row: joints (rad or m), then payload (kg).
     pub sources: Vec<Vec<f64>>,
     /// Measured minus predicted of each row, m.
     pub residual: Vec<[f64; OUTPUTS]>,

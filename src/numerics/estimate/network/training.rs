@@ -50,13 +50,13 @@ pub struct Recipe {
     pub through: Option<ScrewArm>,
     /// Neurons.
     pub hidden: usize,
-    /// Of the hidden layer.
+    /// Activation of the hidden layer.
     pub activation: Activation,
     /// Where the gradient descent begins.
     pub start: TrainingStart,
     /// Members of the swarm.
     pub beetles: usize,
-    /// Of the swarm.
+    /// Generations of the swarm.
     pub generations: usize,
     /// Most iterations of the gradient training.
     pub iterations: usize,
@@ -66,7 +66,7 @@ pub struct Recipe {
     pub members: usize,
     /// Share of the rows kept back from each member's training to stop it early.
     pub keep_back: f64,
-    /// Of start and swarm.
+    /// Seed of start and swarm.
     pub seed: u64,
     /// Threads; the result does not depend on them.
     pub jobs: usize,
@@ -96,7 +96,7 @@ pub struct TrainingStep {
     pub train_rms: f64,
     /// At rows that it is not fitted to, m.
     pub check_rms: Option<f64>,
-    /// Of the loss, so far.
+    /// Evaluations of the loss so far.
     pub evaluations: u64,
 }
 

@@ -39,7 +39,7 @@ impl Tail {
         tail
     }
 
-    /// Of a length in units of the scale.
+    /// Density of a length in units of the scale.
     fn density(&self, length: f64) -> f64 {
         let v = self.freedom;
         let gammas = libm::lgamma((v + 3.0) / 2.0) - libm::lgamma(v / 2.0) - 1.5 * (v * std::f64::consts::PI).ln();

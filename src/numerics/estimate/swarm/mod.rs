@@ -157,7 +157,7 @@ pub struct Search<'a, O: Objective> {
     bounds: &'a SearchBox,
     rng: ChaCha8Rng,
     jobs: usize,
-    /// Of the one thread that evaluates where there are no others.
+    /// Buffers of the one thread that evaluates where there are no others.
     scratch: O::Scratch,
     /// Number of the generation being made, from 1, and how many there may be.
     generation: usize,
