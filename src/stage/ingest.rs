@@ -35,6 +35,7 @@ mod pair;
 mod parquet;
 mod reading;
 mod record;
+mod recorded;
 mod refusal;
 mod rejections;
 mod row;

@@ -33,8 +33,8 @@ pub(super) fn cut(text: &[u8], delimiter: Delimiter, comment: Option<&[u8]>) -> 
 }
 
 /// Whether a quoted field goes on.
-struct OpenQuote {
-    inside: bool,
+pub(super) struct OpenQuote {
+    pub inside: bool,
     /// A quote opens a field here.
     fresh: bool,
 }
@@ -47,7 +47,7 @@ impl Default for OpenQuote {
 
 impl OpenQuote {
     /// Reads one line of a row.
-    fn read(&mut self, line: &[u8], delimiter: Delimiter) {
+    pub(super) fn read(&mut self, line: &[u8], delimiter: Delimiter) {
         let mut bytes = line.iter().copied().peekable();
         while let Some(byte) = bytes.next() {
             if self.inside {

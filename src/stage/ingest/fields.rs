@@ -1,7 +1,6 @@
 //! The fields of a row: what separates them, and how they are quoted.
 
 use super::record::RecordFields;
-use memchr::memchr2_iter;
 use std::ops::Range;
 
 /// What separates fields.
@@ -40,12 +39,28 @@ pub(super) fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<us
     let mut start = 0;
     match delimiter {
         Delimiter::Byte(delimiter) => {
-            for index in memchr2_iter(delimiter, b'"', text) {
-                if text[index] == b'"' {
+            let (chunks, tail) = text.as_chunks::<8>();
+            for (chunk, place) in chunks.iter().zip((0..).step_by(8)) {
+                let word = u64::from_le_bytes(*chunk);
+                if bytes_that_are(b'"', word) != 0 {
                     return false;
                 }
-                fields.push(start..index);
-                start = index + 1;
+                let mut ends = bytes_that_are(delimiter, word);
+                while ends != 0 {
+                    let end = place + ends.trailing_zeros() as usize / 8;
+                    fields.push(start..end);
+                    start = end + 1;
+                    ends &= ends - 1;
+                }
+            }
+            for (end, byte) in (text.len() - tail.len()..).zip(tail) {
+                if *byte == b'"' {
+                    return false;
+                }
+                if *byte == delimiter {
+                    fields.push(start..end);
+                    start = end + 1;
+                }
             }
             fields.push(start..text.len());
         }
@@ -69,8 +84,15 @@ pub(super) fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<us
     true
 }
 
-/// Fields of a row with quotes; false where a quote is still open at the end.
-pub(super) fn unquote(record: &mut RecordFields, delimiter: Delimiter) -> bool {
+/// The highest bit of each byte of `word` that is `wanted`.
+fn bytes_that_are(wanted: u8, word: u64) -> u64 {
+    const LOW: u64 = u64::from_le_bytes([0x7f; 8]);
+    let other = word ^ u64::from_le_bytes([wanted; 8]);
+    !(((other & LOW) + LOW) | other | LOW)
+}
+
+/// Fields of a row with quotes, all of them closed.
+pub(super) fn unquote(record: &mut RecordFields, delimiter: Delimiter) {
     record.fields.clear();
     record.unquoted.clear();
     let (mut start, mut inside, mut fresh) = (0, false, true);
@@ -102,5 +124,4 @@ pub(super) fn unquote(record: &mut RecordFields, delimiter: Delimiter) -> bool {
     if delimiter != Delimiter::Whitespace || !fresh {
         record.fields.push(start..record.unquoted.len());
     }
-    !inside
 }

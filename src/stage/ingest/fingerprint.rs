@@ -1,6 +1,6 @@
 //! Hashes of what rows say: of their ids, and of all else.
 
-use super::row::RecordedRow;
+use super::recorded::RecordedRow;
 use twox_hash::XxHash3_128;
 
 /// Which hashes of a row are asked for.

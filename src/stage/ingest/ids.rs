@@ -2,7 +2,7 @@
 //!
 //! Memory: 32 bytes a row; 16 more where ids neither ascend nor stand in the order in which they are looked for.
 
-use super::row::RecordedRow;
+use super::recorded::RecordedRow;
 use crate::error::{Error, Result};
 use rayon::slice::ParallelSliceMut;
 
@@ -42,8 +42,10 @@ impl FileIds {
     pub fn push(&mut self, row: &RecordedRow, file: usize, label: &str) -> Result<()> {
         let (hash, check) = row.key;
         let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
-        self.mixed |= (row.id.len(), &row.id) <= (self.last.len(), &self.last);
-        self.last.clone_from(&row.id);
+        if !self.mixed {
+            self.mixed = (row.id.len(), &row.id) <= (self.last.len(), &self.last);
+            self.last.clone_from(&row.id);
+        }
         self.keys.push(IdFingerprint { hash, check, file: file as u32, number, line, content: row.content });
         Ok(())
     }

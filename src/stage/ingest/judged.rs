@@ -3,15 +3,15 @@
 use super::bind::Binding;
 use super::encoding;
 use super::record::RecordFields;
+use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
-use super::row::RecordedRow;
 use std::collections::VecDeque;
 use std::iter::repeat_n;
 
 /// Takes rows, and gives them back from the first.
 #[derive(Default)]
 pub(super) struct JudgedRows {
-    rows: Vec<JudgedRow>,
+    rows: Vec<KeptRow>,
     /// Of each row, those that the file fills.
     values: Vec<f64>,
     points: Vec<[f64; 3]>,
@@ -30,7 +30,7 @@ pub(super) struct JudgedRows {
 }
 
 /// What every row has.
-struct JudgedRow {
+struct KeptRow {
     line: u64,
     key: (u64, u32),
     content: u64,
@@ -76,7 +76,7 @@ impl JudgedRows {
         self.records.extend_from_slice(&record.text);
         let rarities = Rarities { sequence: row.sequence, beyond: row.beyond, turned: row.turned };
         let is_rare = rarities.sequence.is_some() || rarities.beyond.is_some() || rarities.turned.is_some();
-        self.rows.push(JudgedRow {
+        self.rows.push(KeptRow {
             line: row.line,
             key: row.key,
             content: row.content,

@@ -5,8 +5,9 @@
 use super::bind::Binding;
 use super::judged::JudgedRows;
 use super::record::{HeldRecords, RecordFields, RecordReader};
+use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
-use super::row::{RecordedRow, RowReader};
+use super::row::RowReader;
 use crate::error::Result;
 use std::collections::VecDeque;
 use std::mem::take;
@@ -87,8 +88,8 @@ impl JudgedFile {
     /// Whether there is another block.
     fn refill(&mut self) -> Result<bool> {
         if let Some(mut reader) = self.reader.take() {
-            self.cut.extend(reader.block()?);
-            if let Some(further) = reader.block()? {
+            self.cut.extend(reader.block(Vec::new())?);
+            if let Some(further) = reader.block(Vec::new())? {
                 self.cut.push_back(further);
                 self.threads = Some(JudgingThreads::new(take(&mut self.cut), reader, &self.judge));
             }
@@ -108,8 +109,9 @@ impl JudgedFile {
 impl JudgingThreads {
     fn new(cut: VecDeque<Block>, reader: Block, judge: &RowReader) -> Self {
         let count = if judge.looks_back() { 1 } else { rayon::current_num_threads().clamp(1, MOST_THREADS) };
-        let (blocks, judges) = (0..count).map(|_| JudgingThread::new(judge.clone())).unzip();
-        Self { judges, cutter: spawn(move || hand_out(cut, reader, blocks)), turn: 0 }
+        let (free, room) = channel();
+        let (blocks, judges) = (0..count).map(|_| JudgingThread::new(judge.clone(), free.clone())).unzip();
+        Self { judges, cutter: spawn(move || hand_out(cut, reader, blocks, room)), turn: 0 }
     }
 
     /// The next block, for the rows of one that was handed out; nothing at the end.
@@ -133,11 +135,11 @@ impl JudgingThreads {
     }
 }
 
-/// Cuts a file and gives the blocks away in turn, until nobody takes them.
-fn hand_out(cut: VecDeque<Block>, mut reader: Block, to: Vec<SyncSender<Result<Block>>>) {
+/// Cuts a file and gives the blocks away in turn, until nobody takes them; `room` is that of blocks that were used.
+fn hand_out(cut: VecDeque<Block>, mut reader: Block, to: Vec<SyncSender<Result<Block>>>, room: Receiver<Vec<u8>>) {
     let mut cut = cut.into_iter();
     for thread in to.iter().cycle() {
-        let block = cut.next().map(Ok).or_else(|| reader.block().transpose());
+        let block = cut.next().map(Ok).or_else(|| reader.block(room.try_recv().unwrap_or_default()).transpose());
         let Some(block) = block else { return };
         let is_last = block.is_err();
         if thread.send(block).is_err() || is_last {
@@ -147,15 +149,15 @@ fn hand_out(cut: VecDeque<Block>, mut reader: Block, to: Vec<SyncSender<Result<B
 }
 
 impl JudgingThread {
-    fn new(mut judge: RowReader) -> (SyncSender<Result<Block>>, Self) {
+    fn new(mut judge: RowReader, free: Sender<Vec<u8>>) -> (SyncSender<Result<Block>>, Self) {
         let (to, blocks) = sync_channel::<Result<Block>>(1);
         let (full, judged) = sync_channel(1);
         let (used, room) = channel::<JudgedRows>();
         let handle = spawn(move || {
             for block in blocks {
                 let mut rows = room.try_recv().unwrap_or_default();
-                let judged = block.and_then(|block| judge.block(block, &mut rows));
-                if full.send(judged.map(|()| rows)).is_err() {
+                let judged = block.and_then(|block| judge.block(block, &mut rows)).map(|room| free.send(room));
+                if full.send(judged.map(|_| rows)).is_err() {
                     return;
                 }
             }

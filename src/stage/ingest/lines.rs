@@ -2,7 +2,7 @@
 //!
 //! A quoted field may hold the delimiter, line ends and `""` for a quote. Empty lines and comments are no rows.
 
-use super::cut::cut;
+use super::cut::{OpenQuote, cut};
 use super::encoding;
 use super::fields::{Delimiter, delimiter, split, unquote};
 use super::layout::FileLayout;
@@ -11,7 +11,6 @@ use crate::error::{Error, Result};
 use crate::raw::{Utf16Reader, is_utf16};
 use memchr::{memchr, memchr_iter};
 use std::io::{BufRead, BufReader, Cursor, Read};
-use std::mem::take;
 
 /// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
 const LONGEST: usize = 1 << 20;
@@ -146,7 +145,7 @@ impl<R: BufRead> TextReader<R> {
     }
 }
 
-impl<R: BufRead + Send> RecordReader for TextReader<R> {
+impl<R: TextBytes> RecordReader for TextReader<R> {
     fn label(&self) -> &str {
         &self.label
     }
@@ -169,12 +168,19 @@ impl<R: BufRead + Send> RecordReader for TextReader<R> {
             if !record.quoted {
                 return Ok(true);
             }
-            while !unquote(record, self.delimiter) {
+            let (mut quote, mut seen) = (OpenQuote::default(), 0);
+            loop {
+                quote.read(&record.text[seen..], self.delimiter);
+                if !quote.inside {
+                    break;
+                }
                 record.text.push(b'\n');
+                seen = record.text.len();
                 if !self.line(&mut record.text)? {
                     return Err(Error::data(format!("{}:{}", self.label, record.line), "a quoted field is not closed"));
                 }
             }
+            unquote(record, self.delimiter);
             return Ok(true);
         }
     }
@@ -190,11 +196,13 @@ impl<R: BufRead + Send> RecordReader for TextReader<R> {
     fn skip(&mut self, lines: u64) -> Result<()> {
         self.pass(lines)
     }
-    fn block(&mut self) -> Result<Option<Box<dyn RecordReader>>> {
-        let mut text = take(&mut self.rest);
+    fn block(&mut self, room: Vec<u8>) -> Result<Option<Box<dyn RecordReader>>> {
+        let mut text = room;
+        text.clear();
+        text.append(&mut self.rest);
         loop {
             let room = self.block.max(text.len());
-            text.reserve_exact(room);
+            text.reserve(room);
             let read = (&mut self.reader).take(room as u64).read_to_end(&mut text);
             let is_last = read.map_err(|error| failed(&self.label, &error))? < room;
             // A row that is too long is told by whoever reads it.
@@ -220,6 +228,28 @@ impl<R: BufRead + Send> RecordReader for TextReader<R> {
             (self.lines, self.bytes) = (self.lines + lines, self.bytes + end as u64);
             return Ok(Some(Box::new(block)));
         }
+    }
+    fn room(self: Box<Self>) -> Vec<u8> {
+        self.reader.room()
+    }
+}
+
+/// Where text comes from: a file, or a block of one.
+pub(super) trait TextBytes: BufRead + Send {
+    /// Of a block, where its bytes are held.
+    fn room(self) -> Vec<u8>
+    where
+        Self: Sized,
+    {
+        Vec::new()
+    }
+}
+
+impl TextBytes for Buffered {}
+
+impl TextBytes for Cursor<Vec<u8>> {
+    fn room(self) -> Vec<u8> {
+        self.into_inner()
     }
 }
 
@@ -288,7 +318,7 @@ mod tests {
         reader.block = bytes;
         let mut rows = Vec::new();
         let mut end = (reader.lines(), reader.bytes());
-        while let Some(mut block) = reader.block().map_err(|error| error.to_string())? {
+        while let Some(mut block) = reader.block(Vec::new()).map_err(|error| error.to_string())? {
             rows.extend(all(block.as_mut()).map_err(|error| error.to_string())?);
             end = (block.lines(), block.bytes());
         }
@@ -332,5 +362,8 @@ mod tests {
             assert!(said.contains("a row of more than 1 MiB"), "{length}: {said}");
             assert_eq!(in_blocks(opened(text.as_bytes(), ",", None), 1 << 10), Err(said));
         }
+        // A quote that is never closed is told at once, however many lines it takes in.
+        let said = all(&mut opened(format!("\"{}", "a\n".repeat(LONGEST)).as_bytes(), ",", None)).unwrap_err().to_string();
+        assert!(said.contains("a row of more than 1 MiB"), "{said}");
     }
 }

@@ -157,7 +157,7 @@ fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::super::fingerprint::hash_of;
-    use super::super::row::RecordedRow;
+    use super::super::recorded::RecordedRow;
     use super::*;
 
     fn times(times: &[f64]) -> Vec<(f64, u32)> {

@@ -29,8 +29,13 @@ pub(super) trait RecordReader: Send {
     }
     /// The rows that come next, as a reader of its own that another thread may read to its end; `None` at the end. Goes on behind what
     /// [`next`](Self::next) read, and nothing else is asked for afterwards.
-    fn block(&mut self) -> Result<Option<Box<dyn RecordReader>>> {
+    /// `room` is that of a block whose rows were used.
+    fn block(&mut self, _room: Vec<u8>) -> Result<Option<Box<dyn RecordReader>>> {
         HeldRecords::of(self)
+    }
+    /// What a block that was read to its end leaves for another one.
+    fn room(self: Box<Self>) -> Vec<u8> {
+        Vec::new()
     }
     /// Skips lines below the header, where the file has lines.
     fn skip(&mut self, _lines: u64) -> Result<()> {

@@ -9,6 +9,7 @@ use super::judged::JudgedRows;
 use super::layout::{Decimal, LimitPolicy};
 use super::number::{self, NumberFault};
 use super::record::{RecordFields, RecordReader};
+use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal, refuse};
 use super::slots::KindSlots;
 use crate::error::Result as Fallible;
@@ -17,42 +18,6 @@ use std::sync::Arc;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
-
-/// The quantities of one row; reused from row to row.
-#[derive(Default)]
-pub(super) struct RecordedRow {
-    /// Number of the data row in its file, from 1.
-    pub number: u64,
-    pub line: u64,
-    /// Empty where there is none.
-    pub id: String,
-    /// By [`Slots::texts`]; empty where there is none.
-    ///
-    /// [`Slots::texts`]: super::slots::Slots::texts
-    pub texts: Vec<String>,
-    pub sequence: Option<i64>,
-    /// SI, by the places of the arm's slots; NaN where missing.
-    pub values: Vec<f64>,
-    /// Of a wide row the point of each target, SI; NaN where it was not seen.
-    pub points: Vec<[f64; 3]>,
-    /// The first joint beyond its limits, from 0.
-    pub beyond: Option<usize>,
-    /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
-    pub turned: Option<(usize, f64)>,
-    /// Nothing stands in any of its fields.
-    pub is_blank: bool,
-    /// Hashes of its id, and of all else that it says; 0 where they were not asked for.
-    pub key: (u64, u32),
-    pub content: u64,
-}
-
-impl RecordedRow {
-    /// An empty one of a file.
-    pub(super) fn of(binding: &Binding, arm: &RobotJoints) -> Self {
-        let texts = vec![String::new(); binding.texts.len()];
-        Self { texts, values: vec![f64::NAN; arm.slots.count], ..Self::default() }
-    }
-}
 
 /// Reads rows of one file.
 #[derive(Clone)]
@@ -87,8 +52,8 @@ impl RowReader {
         self.binding.sequence.is_some() || self.binding.cells.iter().any(|cell| cell.is_clock)
     }
 
-    /// Judges all rows of a block.
-    pub(super) fn block(&mut self, mut block: Box<dyn RecordReader>, rows: &mut JudgedRows) -> Fallible<()> {
+    /// Judges all rows of a block, and gives its room back.
+    pub(super) fn block(&mut self, mut block: Box<dyn RecordReader>, rows: &mut JudgedRows) -> Fallible<Vec<u8>> {
         let binding = self.binding.clone();
         let (mut record, mut row) = (RecordFields::default(), RecordedRow::of(&binding, &self.arm));
         rows.clear();
@@ -103,7 +68,7 @@ impl RowReader {
             rows.push(&binding, &record, &row, judged);
         }
         (rows.lines, rows.bytes) = (block.lines(), block.bytes());
-        Ok(())
+        Ok(block.room())
     }
 
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.

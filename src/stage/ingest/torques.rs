@@ -7,9 +7,9 @@ use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
 use super::reading::{self, OpenedFile, ProgressCounter};
+use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
 use super::rejections::Rejections;
-use super::row::RecordedRow;
 use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
 use crate::error::{Error, Fault, Result, counted};
@@ -214,14 +214,7 @@ impl<'a> MotionRows<'a> {
                 }
                 Err(refusal) => {
                     tally(&mut refused, open.row.line, &refusal);
-                    rejected.push(RejectedRow {
-                        file: name.into(),
-                        line: open.row.line as i64,
-                        point_id: None,
-                        reason: refusal.reason.word().into(),
-                        detail: refusal.detail,
-                        text: open.rows.shown(),
-                    })?;
+                    rejected.push(RejectedRow { point_id: None, ..open.rejected(name, refusal) })?;
                 }
             }
             pace.row(open.rows.bytes());

@@ -99,8 +99,8 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
         let mut beam = vec![best.clone()];
         let mut first = None;
         let mut last = 1.0;
-        let mut visited = Visited::default();
-        while best.len() < self.options.most && visited.is_new(self.pool.bic(&best)) {
+        let mut trail = ClimbTrail::default();
+        while best.len() < self.options.most && trail.is_new(self.pool.bic(&best)) {
             self.multiply(&best);
             last = self.gate(&best);
             first.get_or_insert(last);
@@ -190,9 +190,9 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
 
 /// Where a climb has been, by the criterion. What is pruned may be added again: a climb that comes back is at its end.
 #[derive(Default)]
-struct Visited(BTreeSet<u64>);
+struct ClimbTrail(BTreeSet<u64>);
 
-impl Visited {
+impl ClimbTrail {
     /// Whether the climb was never there; from now on it was.
     fn is_new(&mut self, bic: f64) -> bool {
         self.0.insert(bic.to_bits())
@@ -225,8 +225,8 @@ mod tests {
     fn a_climb_that_adds_and_prunes_the_same_cause_again_and_again_ends() {
         // Adding the second cause makes the first superfluous, pruning that makes room for it again.
         let (criteria, mut at, mut steps) = ([120.0, 80.0, 70.25, 79.5], 0, 0);
-        let mut visited = Visited::default();
-        while visited.is_new(criteria[at]) {
+        let mut trail = ClimbTrail::default();
+        while trail.is_new(criteria[at]) {
             at = if at == 3 { 1 } else { at + 1 };
             steps += 1;
             assert!(steps <= criteria.len(), "the climb goes in a circle");
