@@ -20,8 +20,11 @@ const ODD: [(&str, Option<&str>); 9] = [
     ("P{n};1,5;-2,5;0;0;0", Some("lost_beam")),
 ];
 
-/// The text, and of each row its line, its id and why it is refused.
-fn text() -> (String, Vec<(i64, String, Option<&'static str>)>) {
+/// Its line, its id and why it is refused.
+type Row = (i64, String, Option<&'static str>);
+
+/// The text of a file, and its rows.
+fn text() -> (String, Vec<Row>) {
     let (mut text, mut rows) = ("\u{feff}id;q1;q2;x;y;z\r\n".to_string(), Vec::new());
     for n in 1..=ROWS {
         let line = text.matches('\n').count() as i64 + 1;
