@@ -190,12 +190,15 @@ impl PlaceGroups {
         }
         let mut shaped: Vec<FreeGroup> = columns.finer(&self.groups[g].group).into_iter().collect();
         shaped.extend(with_knots(&self.groups[g].group, beside.state, columns));
-        self.exchanged((g, log), shaped, columns, beside)
+        // Of equal ones the plainer.
+        let best = self.exchanged((g, log + *PAYS), shaped, columns, beside);
+        if best > log + *PAYS { best } else { log }
     }
 
-    /// ln of the evidence of a group beside a state without the price of its place among others like it.
+    /// ln of the evidence of a group beside a state without the price of its place among others like it; none of an amplitude that no arm has.
     fn paid(&self, g: usize, state: &KnownCauses) -> f64 {
-        self.closest(g, state).0.log - (self.groups[g].group.of as f64).ln()
+        let (found, _) = self.closest(g, state);
+        if found.is_off_the_grid() { f64::NEG_INFINITY } else { found.log - (self.groups[g].group.of as f64).ln() }
     }
 
     /// Puts the best of other groups in the place of one whose evidence is `log`, if it says more; returns the evidence of what stands there.
@@ -256,9 +259,14 @@ impl PlaceGroups {
                 log += paid(best);
             }
             log += self.refine(best, &mut columns, &BesideTerms { state: &now, terms: &terms, around });
-            let (found, length) = self.closest(best, &now);
+            let (_, length) = self.closest(best, &now);
+            let first = self.groups.len();
+            self.take(vec![self.groups[best].group.without_idle_waves(length)], &mut columns, around, true);
+            let trimmed = if self.groups.len() > first { first } else { best };
+            let (found, length) = self.closest(trimmed, &now);
             let square = found.amplitude * found.amplitude;
-            let seen = self.groups[best].clone();
+            let seen = self.groups[trimmed].clone();
+            self.groups.truncate(first);
             let variances: Vec<f64> = seen.variances[length].iter().map(|variance| variance * square).collect();
             now = now.with(around.frame, &seen.block.columns, &variances);
             let group = seen.group;

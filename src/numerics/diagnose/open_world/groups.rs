@@ -2,9 +2,9 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::criteria::open_world::{
-    COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
+    COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NEGLIGIBLE, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
-use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
+use crate::effect::{Axes, Basis, Factor, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
@@ -70,6 +70,19 @@ impl FreeGroup {
                 .collect(),
             _ => factors.into_iter().next().unwrap_or_default(),
         }
+    }
+
+    /// Without the waves that hardly vary at one of its lengths.
+    pub fn without_idle_waves(&self, length: usize) -> Self {
+        let trimmed = |factor: Factor| {
+            let Basis::Cosines { low, high, .. } = factor.basis else { return factor };
+            let all = spectra(&factor.basis);
+            let own = &all[length % all.len()];
+            let most = own.iter().copied().fold(0.0, f64::max);
+            let count = own.iter().rposition(|variance| *variance > *NEGLIGIBLE * most).map_or(own.len(), |last| last + 1);
+            Factor::new(factor.of, Basis::Cosines { low, high, count })
+        };
+        Self { law: Law { first: trimmed(self.law.first), times: self.law.times.map(trimmed) }, ..*self }
     }
 
     /// Prior variances of the block's columns, of unit mean square at the tool; a list a length.

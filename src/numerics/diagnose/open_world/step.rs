@@ -53,11 +53,17 @@ impl ModelChange<'_, '_> {
         before.zip(after).is_some_and(|(before, after)| after.is_better_than(&before))
     }
 
-    /// With those of some terms that folds need.
+    /// With those of some terms that folds need: the first ones as far as folds can judge them and are better, without those that do nothing.
     fn of_terms(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
         let mut terms = terms.to_vec();
         loop {
-            let step = self.with_terms(&terms, sentence.clone())?;
+            let Some(step) = self.with_terms(&terms, sentence.clone()) else {
+                terms.pop();
+                if terms.is_empty() {
+                    return None;
+                }
+                continue;
+            };
             let Some(gone) = self.superfluous(&step) else { return Some(step) };
             terms.remove(gone);
         }
