@@ -73,7 +73,7 @@ criteria! {
     /// What a name that stands beside a free form must have of the evidence of all names there.
     SHARED: f64 = 0.1, "share", "judgement: a name of ten is none", "";
     /// Places at which a free form is asked with more than one group.
-    PLACES: usize = 3, "places", "judgement: bounds time", "";
+    PLACES: usize = 2, "places", "judgement: bounds time", "";
     /// Functions of each variable that are looked at.
     LOOKED_AT: usize = 3, "functions", "judgement: bounds time", "";
     /// Products of a motion that become groups.
@@ -81,5 +81,5 @@ criteria! {
     /// Mean square of what is left, over that of noise, below which nothing is looked for.
     STRUCTURED: f64 = 1.1, "ratio of squares", "judgement: the scatter of a variance of some hundred values, doubled", "changes nothing on 2";
     /// Changes of a model at most.
-    ROUNDS: usize = 6, "rounds", "judgement: bounds time", "";
+    ROUNDS: usize = 8, "rounds", "judgement: bounds time", "";
 }

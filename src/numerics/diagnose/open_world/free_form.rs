@@ -20,6 +20,8 @@ pub(super) struct FreeTerm {
     pub group: FreeGroup,
     /// Prior variances of its coefficients, SI.
     pub variances: Vec<f64>,
+    /// ln of its evidence beside the terms before it, choices paid.
+    pub log: f64,
 }
 
 /// What the free form of a place says.
@@ -248,17 +250,14 @@ impl PlaceGroups {
             let paid = |g: usize| scan[g].0.log - self.price(g);
             let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid() && is_new(&self.groups[*g].group, &terms));
             let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
+            let mut own = if step == 0 { self.alternatives(&scan) } else { paid(best) };
             if step == 0 {
-                log = self.alternatives(&scan);
-                if paid(best) < 0.0 {
-                    break;
-                }
-            } else if paid(best) < *PAYS {
-                break;
-            } else {
-                log += paid(best);
+                log = own;
             }
-            log += self.refine(best, &mut columns, &BesideTerms { state: &now, terms: &terms, around });
+            if step == 0 && paid(best) < 0.0 || step > 0 && own < *PAYS {
+                break;
+            }
+            own += self.refine(best, &mut columns, &BesideTerms { state: &now, terms: &terms, around });
             let (_, length) = self.closest(best, &now);
             let first = self.groups.len();
             self.take(vec![self.groups[best].group.without_idle_waves(length)], &mut columns, around, true);
@@ -270,7 +269,8 @@ impl PlaceGroups {
             let variances: Vec<f64> = seen.variances[length].iter().map(|variance| variance * square).collect();
             now = now.with(around.frame, &seen.block.columns, &variances);
             let group = seen.group;
-            terms.push(FreeTerm { group, variances });
+            log = if step == 0 { own } else { log + own };
+            terms.push(FreeTerm { group, variances, log: own });
             if step == 0 {
                 let products = columns.products(&group);
                 self.take(products, &mut columns, around, true);
@@ -316,7 +316,7 @@ mod tests {
             law: Law::new(Variable::Recent { joint, time }, Basis::Cosines { low: 0.0, high: 1.0, count: 4 }),
             of: 3,
         };
-        let terms = [FreeTerm { group: recent(0, 15.0), variances: vec![1.0; 4] }];
+        let terms = [FreeTerm { group: recent(0, 15.0), variances: vec![1.0; 4], log: 0.0 }];
         assert!(!is_new(&recent(0, 80.0), &terms) && is_new(&recent(1, 80.0), &terms));
     }
 }

@@ -44,6 +44,11 @@ impl FreeGroup {
         self.motion.place()
     }
 
+    /// How many of its factors are curves.
+    pub fn curves(&self) -> usize {
+        self.law.factors().filter(|factor| factor.basis.is_curve()).count()
+    }
+
     /// Whether time is one of its variables: later rows are beyond all that was seen.
     pub fn drifts(&self) -> bool {
         self.law.factors().any(|factor| factor.of == Variable::Time)

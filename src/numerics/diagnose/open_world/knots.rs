@@ -16,12 +16,15 @@ enum Piece {
     Straight,
 }
 
-/// A group with knots in the place of a smooth curve: with jumps and with corners over each of its variables, as far as knots pay.
+/// A group with knots in the place of its smooth curve: with jumps and with corners, as far as knots pay; none of a product of two curves.
 pub(super) fn with_knots(group: &FreeGroup, state: &KnownCauses, columns: &mut GroupColumns) -> Vec<FreeGroup> {
     let Law { first, times } = group.law;
     let mut ways = vec![(first, times)];
     ways.extend(times.map(|times| (times, Some(first))));
     let mut out = Vec::new();
+    if group.curves() > 1 {
+        return out;
+    }
     for (of, other) in ways.into_iter().filter(|(of, _)| of.basis.is_curve()) {
         let Some(mut values) = columns.values(of.of).map(<[f64]>::to_vec) else { continue };
         values.sort_by(f64::total_cmp);

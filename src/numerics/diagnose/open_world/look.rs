@@ -1,7 +1,7 @@
 //! A look at a judged model: free forms of all places beside it, instead of it, and instead of each of its findings.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use super::free_form::{AroundGroups, FreeForm, PlaceGroups, side_by_side};
+use super::free_form::{AroundGroups, FreeForm, FreeTerm, PlaceGroups, side_by_side};
 use super::names::{
     ContestedName, NameCase, NameOdds, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places,
     unit_variances,
@@ -118,7 +118,9 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// A law of the list or the free form of a place beside everything.
     pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
         let price = (self.beside.logs.len().max(1) as f64).ln();
-        let form = self.beside.best.iter().find(|form| form.log - price > *STRONG && !refused.contains(&form.place))?;
+        let strong = self.beside.best.iter().filter(|form| form.log - price > *STRONG && !refused.contains(&form.place));
+        let first = |form: &FreeForm| form.terms.first().map_or(f64::NEG_INFINITY, |term| term.log);
+        let form = strong.max_by(|a, b| first(a).total_cmp(&first(b)))?;
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let laws = case.listed(&[], &self.whole);
@@ -130,13 +132,22 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         });
         let free = || {
             let sentence = format!("a free form at {} joins: {:.0} nats of evidence", form.place, form.log);
-            self.change(&[], 0.0).free(&form.terms, sentence)
+            self.change(&[], 0.0).free(self.own_terms(form), sentence)
         };
         let step = named.or_else(free);
         if step.is_none() {
             refused.push(form.place);
         }
         step
+    }
+
+    /// The terms of a free form that say more than any other place does alone: what the others take up may belong there, and is asked again
+    /// beside the first.
+    fn own_terms<'f>(&self, form: &'f FreeForm) -> &'f [FreeTerm] {
+        let elsewhere = self.beside.firsts.iter().filter(|(place, _)| *place != form.place).map(|(_, log)| *log);
+        let most = elsewhere.fold(f64::NEG_INFINITY, f64::max);
+        let own = form.terms.iter().skip(1).take_while(|term| term.log > most).count();
+        &form.terms[..form.terms.len().min(own + 1)]
     }
 
     /// The odds of a finding; of a weak name none of the list is right but for what evidence misleads.

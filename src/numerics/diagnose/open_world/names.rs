@@ -42,6 +42,8 @@ pub(super) struct ContestedName {
 pub(super) struct SurveyedPlaces {
     /// ln of the evidence of each place's.
     pub logs: Vec<(Place, f64)>,
+    /// The same of one group alone.
+    pub firsts: Vec<(Place, f64)>,
     /// The best ones with their terms, best first.
     pub best: Vec<FreeForm>,
 }
@@ -88,7 +90,8 @@ pub(super) fn survey_places(
             own.sort_by(|a, b| b.log.total_cmp(&a.log));
             let log = |p: usize| own.iter().find(|form| form.place == all[p]).map_or(firsts[p][s], |form| form.log);
             let logs = (0..all.len()).map(|p| (all[p], log(p))).collect();
-            SurveyedPlaces { logs, best: own }
+            let firsts = (0..all.len()).map(|p| (all[p], firsts[p][s])).collect();
+            SurveyedPlaces { logs, firsts, best: own }
         })
         .collect()
 }

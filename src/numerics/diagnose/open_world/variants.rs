@@ -1,7 +1,7 @@
 //! Groups like one that shows: with other numbers of its variables, with variables that go along with these, with shorter waves.
 
 use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
-use crate::criteria::open_world::{COARSE, EACH, FINE, FINEST};
+use crate::criteria::open_world::{EACH, FINE, FINEST};
 use crate::effect::{Factor, Law, Variable};
 use nalgebra::Vector3;
 
@@ -70,10 +70,12 @@ impl GroupColumns<'_, '_> {
         laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()
     }
 
-    /// A group with more and shorter waves.
+    /// A group with more and shorter waves; none of a product of two curves.
     pub fn finer(&mut self, group: &FreeGroup) -> Option<FreeGroup> {
-        let curves = group.law.factors().filter(|factor| factor.basis.is_curve()).count();
-        let count = if curves > 1 { *COARSE } else { *FINEST };
+        if group.curves() > 1 {
+            return None;
+        }
+        let count = *FINEST;
         let two = group.law.times.is_some();
         let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
         let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
