@@ -4,11 +4,10 @@ use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
 use crate::criteria::open_world::ROUNDS;
-use crate::criteria::words::REJECTED;
 use crate::diagnose::finding_groups::FindingKey;
-use crate::diagnose::judge::{FoldErrors, JudgedCauses};
+use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
-use crate::diagnose::round::{FitState, Fitter, RoundView};
+use crate::diagnose::round::{Fitter, RoundView};
 use crate::diagnose::words::of_the_open_world;
 use crate::effect::{Place, Survey};
 use std::collections::BTreeMap;
@@ -54,14 +53,7 @@ pub(crate) fn settle(
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
             }
         }
-        let Some(ModelStep { state, kept, new, sentence }) = step else {
-            let doubtful = odds.values().any(|odds| odds.none > *REJECTED);
-            let (judged, lost) = carried(judged, doubtful, fitter);
-            if let Some(sentence) = lost {
-                tell(format!("withdrawn: {sentence}"));
-            }
-            return Settled { judged, odds };
-        };
+        let Some(ModelStep { state, kept, new, sentence }) = step else { return Settled { judged, odds } };
         tell(sentence);
         let mut set: Vec<usize> = kept.iter().map(|i| judged.set[*i]).collect();
         let first = pool.add(new);
@@ -69,20 +61,4 @@ pub(crate) fn settle(
         judged = JudgedCauses { state, set, gains: Vec::new(), withdrawn: judged.withdrawn };
         round += 1;
     }
-}
-
-/// A model as far as it carries over: where something in it has no name, and stretches of the recording that a fit has not seen are clearly
-/// predicted better by the base model alone, all of them or the first or the last, all findings are taken back, with the sentence that says so.
-fn carried(judged: JudgedCauses, doubtful: bool, fitter: &Fitter) -> (JudgedCauses, Option<String>) {
-    let nameless = doubtful || judged.state.causes.iter().any(|cause| cause.form.cause().is_nameless());
-    let base = nameless.then(|| fitter.fit(&judged.state.model, Vec::new()));
-    let errors = |state: &FitState| FoldErrors::of_stretches(state, fitter);
-    let better = |base: &FitState| {
-        let both = errors(base).zip(errors(&judged.state));
-        both.is_some_and(|(base, own)| base.is_better_than(&own) || base.is_better_at_an_end_than(&own))
-    };
-    let Some(base) = base.filter(better) else { return (judged, None) };
-    let sentence = "all findings together: stretches of the recording that a fit has not seen are predicted better without them";
-    let withdrawn = judged.withdrawn.into_iter().chain([sentence.to_string()]).collect();
-    (JudgedCauses { state: base, set: Vec::new(), gains: Vec::new(), withdrawn }, Some(sentence.to_string()))
 }

@@ -1,7 +1,7 @@
 //! Groups like one that shows: with other numbers of its variables, with variables that go along with these, with shorter waves.
 
 use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
-use crate::criteria::open_world::{EACH, FINE, FINEST};
+use crate::criteria::open_world::{EACH, FINE};
 use crate::effect::{Factor, Law, Variable};
 use nalgebra::Vector3;
 
@@ -75,7 +75,7 @@ impl GroupColumns<'_, '_> {
         if group.curves() > 1 {
             return None;
         }
-        let count = *FINEST;
+        let count = *FINE;
         let two = group.law.times.is_some();
         let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
         let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
