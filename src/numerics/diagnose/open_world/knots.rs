@@ -6,7 +6,7 @@ use super::frame::GroupProducts;
 use super::groups::{FreeGroup, GroupColumns};
 use super::state::KnownCauses;
 use crate::criteria::open_world::{CLOSER_KNOTS, KNOTS, PAYS};
-use crate::effect::{Basis, Factor, Knots, Law};
+use crate::effect::{Basis, Factor, Knots, Law, Variable};
 use nalgebra::{DMatrix, DVector};
 
 /// What is between two knots, or at one.
@@ -25,7 +25,8 @@ pub(super) fn with_knots(group: &FreeGroup, state: &KnownCauses, columns: &mut G
     if group.curves() > 1 {
         return out;
     }
-    for (of, other) in ways.into_iter().filter(|(of, _)| of.basis.is_curve()) {
+    // A few rows that are wrong one after another are no jump to and fro in time; one step in time is a group of its own.
+    for (of, other) in ways.into_iter().filter(|(of, _)| of.basis.is_curve() && of.of != Variable::Time) {
         let Some(mut values) = columns.values(of.of).map(<[f64]>::to_vec) else { continue };
         values.sort_by(f64::total_cmp);
         let ends = [values[0], values[values.len() - 1]];
