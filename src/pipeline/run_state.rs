@@ -7,6 +7,7 @@ use crate::raw;
 use crate::stage::Arity;
 use crate::store::schema;
 use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -22,6 +23,16 @@ pub(super) struct RunState<'a> {
 struct HashedFile {
     content: FileHash,
     look: Option<FileLook>,
+}
+
+impl HashedFile {
+    fn read(path: &Path) -> Result<Self> {
+        // First the look: of a file that is written meanwhile it is an old one.
+        let look = look(path);
+        let content = raw::open(path).and_then(FileHash::of_reader);
+        let content = content.map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
+        Ok(Self { content, look })
+    }
 }
 
 /// Size and time of the last change: where these stay, so did the content.
@@ -58,6 +69,7 @@ impl<'a> RunState<'a> {
             }
             reads.insert(input.port.name.to_string(), keys);
         }
+        self.hash_all(index)?;
         let mut files = BTreeMap::new();
         for file in &stage.files {
             let key = FileKey { name: label(&file.path), content: self.hash(&file.path)? };
@@ -92,13 +104,25 @@ impl<'a> RunState<'a> {
         if let Some(hashed) = self.hashes.get(path) {
             return Ok(hashed.content.clone());
         }
-        // First the look: of a file that is written meanwhile it is an old one.
-        let look = look(path);
-        let content = raw::open(path)
-            .and_then(FileHash::of_reader)
-            .map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
-        self.hashes.insert(path.into(), HashedFile { content: content.clone(), look });
+        let hashed = HashedFile::read(path)?;
+        let content = hashed.content.clone();
+        self.hashes.insert(path.into(), hashed);
         Ok(content)
+    }
+
+    /// Hashes the raw input files of a stage side by side.
+    fn hash_all(&mut self, index: usize) -> Result<()> {
+        let mut fresh: Vec<&PathBuf> = Vec::new();
+        for path in self.plan.stages[index].files.iter().map(|file| &file.path) {
+            if !self.hashes.contains_key(path) && !fresh.contains(&path) {
+                fresh.push(path);
+            }
+        }
+        let hashed: Vec<Result<HashedFile>> = fresh.par_iter().map(|path| HashedFile::read(path)).collect();
+        for (path, hashed) in fresh.into_iter().zip(hashed) {
+            self.hashes.insert(path.clone(), hashed?);
+        }
+        Ok(())
     }
 
     /// Fails where a raw input file of a stage is no longer what the stage's key says: its tables would stand under the key of another

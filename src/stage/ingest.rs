@@ -13,10 +13,15 @@ mod check;
 mod clock;
 mod columns;
 mod copies;
+mod cut;
 pub mod encoding;
 mod feather;
+mod fields;
+mod fingerprint;
 mod ids;
 mod joined;
+mod judged;
+mod judging;
 mod later;
 mod layout;
 mod lines;
@@ -28,9 +33,10 @@ mod number;
 mod once;
 mod pair;
 mod parquet;
-mod prefetch;
 mod reading;
 mod record;
+mod recorded;
+mod refusal;
 mod rejections;
 mod row;
 mod scan;
@@ -65,6 +71,7 @@ use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Reads raw files into a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -143,7 +150,7 @@ impl Stage for Ingest {
         first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?;
+        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?.map(Arc::new);
         let mut faults = Vec::new();
         for layout in self.measurements().iter().flat_map(|one| &one.files) {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -159,7 +166,7 @@ impl Stage for Ingest {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        let arm = arm::RobotJoints::of(&reads.robot)?;
+        let arm = Arc::new(arm::RobotJoints::of(&reads.robot)?);
         let measurements = self.measurements();
         let (mut scanned, mut written) = (Vec::new(), None);
         for one in &measurements {

@@ -1,5 +1,6 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
+mod blocks;
 mod clocks;
 mod counting;
 mod feather;

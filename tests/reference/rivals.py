@@ -85,10 +85,9 @@ def children():
 def calib(case, arguments, without):
     with tempfile.TemporaryDirectory(dir=arguments.work) as folder:
         store = pathlib.Path(folder) / "store"
-        text = (ROOT / "pipelines/case/pipeline.yaml").read_text()
-        pipeline = pathlib.Path(folder) / "pipeline.yaml"
-        pipeline.write_text(text.replace("  - uses: diagnose\n", f"  - uses: diagnose\n    with: {{without: {json.dumps(without)}}}\n") if without else text)
-        run = [arguments.calib, "run", pipeline, "--set", f"case={case}", "--store", store]
+        run = [arguments.calib, "run", ROOT / "pipelines/case/pipeline.yaml", "--set", f"case={case}", "--store", store]
+        if without:
+            run += ["--set", f"diagnose.without={json.dumps(without)}"]
         subprocess.run(run, check=True, capture_output=True)
         spent = children()
 

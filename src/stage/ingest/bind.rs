@@ -24,6 +24,8 @@ pub(super) struct Binding {
     pub id: Option<TextBinding>,
     /// In the order of the row's texts.
     pub texts: Vec<Option<TextBinding>>,
+    /// Those that the file has.
+    pub worded: Vec<usize>,
     /// Quantities of several numbers: where they are, and how they are read.
     pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
@@ -87,6 +89,7 @@ impl Binding {
     fn settle(&mut self, arm: &RobotJoints, is_wide: bool) {
         let kept = self.conventions.iter().flat_map(|(places, ..)| places.clone());
         self.filled = self.slots().into_iter().chain(kept).collect::<BTreeSet<usize>>().into_iter().collect();
+        self.worded = (0..self.texts.len()).filter(|place| self.texts[*place].is_some()).collect();
         let brought = |kind: &KindSlots| kind.name.is_some_and(|name| self.texts.get(name).is_some_and(Option::is_some));
         let is_filled = |place: &usize| self.filled.binary_search(place).is_ok();
         let is_read = |kind: &KindSlots| kind.values.iter().any(|place| self.cells.iter().any(|cell| cell.index == *place));
@@ -122,6 +125,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         width: head.width,
         id: None,
         texts: arm.slots.texts().iter().map(|_| None).collect(),
+        worded: Vec::new(),
         conventions: Vec::new(),
         measures: false,
         kinds: Vec::new(),

@@ -3,9 +3,9 @@
 use super::axes::{self, needed};
 use super::clock::CLOCK;
 use super::columns::Columns;
+use super::fields::delimiter;
 use super::later;
 use super::layout::{Duplicates, FileLayout, Join};
-use super::lines::delimiter;
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
 use super::noise;
 use super::{Ingest, twice};

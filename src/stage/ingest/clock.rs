@@ -18,7 +18,7 @@ pub fn is_clock_time(text: &str) -> bool {
 const DAY: f64 = 86_400.0;
 
 /// Reads one column of clock times.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct ClockColumn {
     /// The last time of day, s, and the midnights since the first.
     last: f64,

@@ -2,10 +2,9 @@
 //!
 //! Memory: 32 bytes a row; 16 more where ids neither ascend nor stand in the order in which they are looked for.
 
-use super::row::RecordedRow;
+use super::recorded::RecordedRow;
 use crate::error::{Error, Result};
 use rayon::slice::ParallelSliceMut;
-use twox_hash::XxHash3_128;
 
 /// What is remembered of a point id: 96 bits of its hash (two ids in 10^7 are confused once in 10^14 files) and its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,22 +34,19 @@ pub(super) struct FileIds {
     sorted: Vec<(u64, u32)>,
 }
 
-/// 96 bits of an id's hash.
-fn hash_of(id: &str) -> (u64, u32) {
-    let hash = XxHash3_128::oneshot(id.as_bytes());
-    (hash as u64, (hash >> 64) as u32)
-}
-
 /// Keys that are passed over before one is looked for among all.
 const NEAR: usize = 4;
 
 impl FileIds {
-    pub fn push(&mut self, row: &RecordedRow, content: u64, file: usize, label: &str) -> Result<()> {
-        let (hash, check) = hash_of(&row.id);
+    /// Adds a usable row, which has its hashes.
+    pub fn push(&mut self, row: &RecordedRow, file: usize, label: &str) -> Result<()> {
+        let (hash, check) = row.key;
         let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
-        self.mixed |= (row.id.len(), &row.id) <= (self.last.len(), &self.last);
-        self.last.clone_from(&row.id);
-        self.keys.push(IdFingerprint { hash, check, file: file as u32, number, line, content });
+        if !self.mixed {
+            self.mixed = (row.id.len(), &row.id) <= (self.last.len(), &self.last);
+            self.last.clone_from(&row.id);
+        }
+        self.keys.push(IdFingerprint { hash, check, file: file as u32, number, line, content: row.content });
         Ok(())
     }
 
@@ -68,17 +64,8 @@ impl FileIds {
         &self.keys
     }
 
-    /// A data row with an id; of several any.
-    pub fn row_of(&mut self, id: &str) -> Option<u32> {
-        self.find(hash_of(id))
-    }
-
-    /// The data row with the id of another key.
-    pub fn row_like(&mut self, key: &IdFingerprint) -> Option<u32> {
-        self.find((key.hash, key.check))
-    }
-
-    fn find(&mut self, wanted: (u64, u32)) -> Option<u32> {
+    /// A data row with the id of this hash; of several any.
+    pub fn find(&mut self, wanted: (u64, u32)) -> Option<u32> {
         let is = |key: &IdFingerprint| (key.hash, key.check) == wanted;
         let near = |from: usize| self.keys.iter().skip(from).take(NEAR).position(is).map(|ahead| from + ahead);
         // From the beginning too: rows are looked for more than once.

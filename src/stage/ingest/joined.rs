@@ -4,14 +4,16 @@ use super::Ingest;
 use super::arm::RobotJoints;
 use super::layout::Join;
 use super::pair::{FileDecision, NONE};
-use super::row::{Reason, RecordedRow, RowRefusal};
+use super::recorded::RecordedRow;
+use super::refusal::{Reason, RowRefusal};
 use super::scan::{PackedRows, Scan};
 use crate::observation::{KINDS, Part};
+use std::sync::Arc;
 
 /// What all files give and decide together.
 pub(super) struct JoinDecisions<'a> {
     pub settings: &'a Ingest,
-    pub arm: &'a RobotJoints,
+    pub arm: &'a Arc<RobotJoints>,
     pub scans: &'a [Scan],
     pub decisions: &'a [FileDecision],
     /// Names of the files in tables.

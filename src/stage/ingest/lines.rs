@@ -2,17 +2,21 @@
 //!
 //! A quoted field may hold the delimiter, line ends and `""` for a quote. Empty lines and comments are no rows.
 
+use super::cut::{OpenQuote, cut};
 use super::encoding;
+use super::fields::{Delimiter, delimiter, split, unquote};
 use super::layout::FileLayout;
 use super::record::{BUFFER, Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Result};
 use crate::raw::{Utf16Reader, is_utf16};
-use memchr::{memchr, memchr2_iter};
-use std::io::{BufRead, BufReader, Read};
-use std::ops::Range;
+use memchr::{memchr, memchr_iter};
+use std::io::{BufRead, BufReader, Cursor, Read};
 
 /// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
 const LONGEST: usize = 1 << 20;
+
+/// Bytes of a block of rows: enough of them that threads seldom meet, few enough to stay in a core's cache.
+const BLOCK: usize = 1 << 18;
 
 /// What no other kind of file is.
 pub(super) const FORMAT: FileFormat = FileFormat { is: |_, _| true, has_sheets: false, open };
@@ -25,30 +29,9 @@ fn open(mut source: Buffered, label: &str, layout: &FileLayout) -> Result<Box<dy
     Ok(Box::new(TextReader::open(source, label, layout)?))
 }
 
-/// What separates fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Delimiter {
-    Byte(u8),
-    Whitespace,
-}
-
-/// The delimiter that a person wrote, or `None` for what is not allowed.
-pub(super) fn delimiter(text: &str) -> Option<Delimiter> {
-    match (text, text.as_bytes()) {
-        ("tab", _) => Some(Delimiter::Byte(b'\t')),
-        ("whitespace", _) => Some(Delimiter::Whitespace),
-        (_, [byte])
-            if byte.is_ascii() && !byte.is_ascii_alphanumeric() && !matches!(byte, b'"' | b'\n' | b'\r' | b'.' | b'-' | b'+') =>
-        {
-            Some(Delimiter::Byte(*byte))
-        }
-        _ => None,
-    }
-}
-
 /// Reads one file from its first line to its last.
-pub(super) struct TextReader {
-    reader: Buffered,
+pub(super) struct TextReader<R> {
+    reader: R,
     label: String,
     delimiter: Delimiter,
     comment: Option<Vec<u8>>,
@@ -57,15 +40,29 @@ pub(super) struct TextReader {
     /// Physical lines read so far.
     lines: u64,
     bytes: u64,
+    /// What was read behind the last row of a block.
+    rest: Vec<u8>,
+    /// Bytes of a block, about.
+    block: usize,
 }
 
-impl TextReader {
+impl<R: BufRead> TextReader<R> {
     /// Opens a file and skips what stands above header and data; `None` where nothing is left.
-    pub(super) fn open(reader: Buffered, label: &str, layout: &FileLayout) -> Result<Self> {
+    pub(super) fn open(reader: R, label: &str, layout: &FileLayout) -> Result<Self> {
         let delimiter = delimiter(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
         let comment = layout.comment.as_ref().map(|text| text.as_bytes().to_vec());
         let header_in_comment = layout.header_in_comment;
-        let mut lines = Self { reader, label: label.into(), delimiter, comment, header_in_comment, lines: 0, bytes: 0 };
+        let mut lines = Self {
+            reader,
+            label: label.into(),
+            delimiter,
+            comment,
+            header_in_comment,
+            lines: 0,
+            bytes: 0,
+            rest: Vec::new(),
+            block: BLOCK,
+        };
         lines.byte_order_mark()?;
         lines.pass(layout.skip)?;
         Ok(lines)
@@ -117,7 +114,7 @@ impl TextReader {
         }
         self.bytes += read as u64;
         self.lines += 1;
-        if text.last() == Some(&b'\n') {
+        if room > 0 && text.last() == Some(&b'\n') {
             text.pop();
             if text.last() == Some(&b'\r') {
                 text.pop();
@@ -148,7 +145,7 @@ impl TextReader {
     }
 }
 
-impl RecordReader for TextReader {
+impl<R: TextBytes> RecordReader for TextReader<R> {
     fn label(&self) -> &str {
         &self.label
     }
@@ -171,12 +168,19 @@ impl RecordReader for TextReader {
             if !record.quoted {
                 return Ok(true);
             }
-            while !unquote(record, self.delimiter) {
+            let (mut quote, mut seen) = (OpenQuote::default(), 0);
+            loop {
+                quote.read(&record.text[seen..], self.delimiter);
+                if !quote.inside {
+                    break;
+                }
                 record.text.push(b'\n');
+                seen = record.text.len();
                 if !self.line(&mut record.text)? {
                     return Err(Error::data(format!("{}:{}", self.label, record.line), "a quoted field is not closed"));
                 }
             }
+            unquote(record, self.delimiter);
             return Ok(true);
         }
     }
@@ -192,87 +196,68 @@ impl RecordReader for TextReader {
     fn skip(&mut self, lines: u64) -> Result<()> {
         self.pass(lines)
     }
-}
-
-/// Fields of a row without quotes; false where it has some.
-fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) -> bool {
-    let mut start = 0;
-    match delimiter {
-        Delimiter::Byte(delimiter) => {
-            for index in memchr2_iter(delimiter, b'"', text) {
-                if text[index] == b'"' {
-                    return false;
-                }
-                fields.push(start..index);
-                start = index + 1;
+    fn block(&mut self, room: Vec<u8>) -> Result<Option<Box<dyn RecordReader>>> {
+        let mut text = room;
+        text.clear();
+        text.append(&mut self.rest);
+        loop {
+            let room = self.block.max(text.len());
+            text.reserve(room);
+            let read = (&mut self.reader).take(room as u64).read_to_end(&mut text);
+            let is_last = read.map_err(|error| failed(&self.label, &error))? < room;
+            // A row that is too long is told by whoever reads it.
+            let whole = if is_last || text.len() > 2 * LONGEST { Some(text.len()) } else { None };
+            let Some(end) = whole.or_else(|| cut(&text, self.delimiter, self.comment.as_deref())) else { continue };
+            if end == 0 {
+                return Ok(None);
             }
-            fields.push(start..text.len());
-        }
-        Delimiter::Whitespace => {
-            let mut inside = false;
-            for (index, byte) in text.iter().enumerate() {
-                let blank = matches!(byte, b' ' | b'\t');
-                if inside && blank {
-                    fields.push(start..index);
-                } else if !inside && !blank {
-                    start = index;
-                }
-                inside = !blank;
-            }
-            if inside {
-                fields.push(start..text.len());
-            }
-            return !text.contains(&b'"');
-        }
-    }
-    true
-}
-
-/// Fields of a row with quotes; false where a quote is still open at the end.
-fn unquote(record: &mut RecordFields, delimiter: Delimiter) -> bool {
-    record.fields.clear();
-    record.unquoted.clear();
-    let (mut start, mut inside, mut fresh) = (0, false, true);
-    let mut bytes = record.text.iter().copied().peekable();
-    while let Some(byte) = bytes.next() {
-        let ends = !inside
-            && match delimiter {
-                Delimiter::Byte(delimiter) => byte == delimiter,
-                Delimiter::Whitespace => matches!(byte, b' ' | b'\t'),
+            self.rest.extend_from_slice(&text[end..]);
+            text.truncate(end);
+            let lines = memchr_iter(b'\n', &text).count() as u64;
+            let block = TextReader {
+                reader: Cursor::new(text),
+                label: self.label.clone(),
+                delimiter: self.delimiter,
+                comment: self.comment.clone(),
+                header_in_comment: self.header_in_comment,
+                lines: self.lines,
+                bytes: self.bytes,
+                rest: Vec::new(),
+                block: self.block,
             };
-        if inside && byte == b'"' {
-            if bytes.peek() == Some(&b'"') {
-                bytes.next();
-                record.unquoted.push(b'"');
-            } else {
-                inside = false;
-            }
-        } else if ends {
-            if delimiter != Delimiter::Whitespace || !fresh {
-                record.fields.push(start..record.unquoted.len());
-            }
-            start = record.unquoted.len();
-            fresh = true;
-        } else if fresh && byte == b'"' {
-            inside = true;
-            fresh = false;
-        } else {
-            // Blanks before a quote do not make it part of the text.
-            fresh = fresh && !inside && matches!(byte, b' ' | b'\t');
-            record.unquoted.push(byte);
+            (self.lines, self.bytes) = (self.lines + lines, self.bytes + end as u64);
+            return Ok(Some(Box::new(block)));
         }
     }
-    if delimiter != Delimiter::Whitespace || !fresh {
-        record.fields.push(start..record.unquoted.len());
+    fn room(self: Box<Self>) -> Vec<u8> {
+        self.reader.room()
     }
-    !inside
+}
+
+/// Where text comes from: a file, or a block of one.
+pub(super) trait TextBytes: BufRead + Send {
+    /// Of a block, where its bytes are held.
+    fn room(self) -> Vec<u8>
+    where
+        Self: Sized,
+    {
+        Vec::new()
+    }
+}
+
+impl TextBytes for Buffered {}
+
+impl TextBytes for Cursor<Vec<u8>> {
+    fn room(self) -> Vec<u8> {
+        self.into_inner()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Vec<(u64, Vec<String>)> {
+    fn opened(text: &[u8], delimiter: &str, comment: Option<&str>) -> TextReader<Cursor<Vec<u8>>> {
         let layout = FileLayout {
             file: Default::default(),
             sheet: None,
@@ -286,14 +271,22 @@ mod tests {
             targets: None,
             columns: Default::default(),
         };
-        let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);
-        let mut lines = TextReader::open(reader, "a.csv", &layout).unwrap();
+        TextReader::open(Cursor::new(text.to_vec()), "a.csv", &layout).unwrap()
+    }
+
+    type Rows = Vec<(u64, Vec<String>)>;
+
+    fn all(reader: &mut dyn RecordReader) -> Result<Rows> {
         let (mut record, mut rows) = (RecordFields::default(), Vec::new());
-        while lines.next(&mut record).unwrap() {
+        while reader.next(&mut record)? {
             let fields = (0..record.len()).map(|index| String::from_utf8_lossy(record.field(index).unwrap()).into()).collect();
             rows.push((record.line, fields));
         }
-        rows
+        Ok(rows)
+    }
+
+    fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Rows {
+        all(&mut opened(text.as_bytes(), delimiter, comment)).unwrap()
     }
 
     fn row(line: u64, fields: &[&str]) -> (u64, Vec<String>) {
@@ -318,5 +311,59 @@ mod tests {
         let text = "  a\t b  \n1   \"two words\"  3\n";
         assert_eq!(rows(text, "whitespace", None), [row(1, &["a", "b"]), row(2, &["1", "two words", "3"])]);
         assert_eq!(rows("a\tb\n\t\n", "tab", None), [row(1, &["a", "b"]), row(2, &["", ""])]);
+    }
+
+    /// Rows with lines and bytes at the end, read in blocks of about so many bytes; or what is wrong.
+    fn in_blocks(mut reader: TextReader<Cursor<Vec<u8>>>, bytes: usize) -> Result<(Rows, u64, u64), String> {
+        reader.block = bytes;
+        let mut rows = Vec::new();
+        let mut end = (reader.lines(), reader.bytes());
+        while let Some(mut block) = reader.block(Vec::new()).map_err(|error| error.to_string())? {
+            rows.extend(all(block.as_mut()).map_err(|error| error.to_string())?);
+            end = (block.lines(), block.bytes());
+        }
+        Ok((rows, end.0, end.1))
+    }
+
+    #[test]
+    fn blocks_of_any_size_hold_the_rows_of_the_file() {
+        let texts: [(&[u8], &str); 14] = [
+            (b"", ","),
+            (b"\n\n", ","),
+            (b"a,b", ","),
+            (b"\xef\xbb\xbfa,b\r\n\r\n# no \" row\r\n1,2\r\n\n3, 4", ","),
+            (b"a;b\n\"x\ny\";1\n\n\"\"\"\n\"\"\";2\n", ";"),
+            (b"\"a\r\n\r\nb\",1\r\n \"c\n# d\",2\r\n", ","),
+            (b"5\" pipe,1\n6\"\n7\"\n", ","),
+            (b"\"a\"b\"\n\"\"\n\"\"\"\"\n", ","),
+            (b"1\t\t\n\t\t\n2\t3\t\"\n\"", "tab"),
+            (b" a \"b\nc\"  d\n  \ne \"\" f\n", "whitespace"),
+            (b"a,\0,b\n\0\n\"\0\n\",1\n", ","),
+            (b"a,b\n\"never closed\n1,2\n", ","),
+            (b"a,b\n\"never closed", ","),
+            (b"a\rb,c\r\n\r1\n", ","),
+        ];
+        for (text, delimiter) in texts {
+            let mut reader = opened(text, delimiter, Some("#"));
+            let whole = all(&mut reader).map_err(|error| error.to_string());
+            let whole = whole.map(|rows| (rows, reader.lines(), reader.bytes()));
+            for bytes in 1..=text.len() + 1 {
+                let found = in_blocks(opened(text, delimiter, Some("#")), bytes);
+                assert_eq!(found, whole, "{bytes} of {}", String::from_utf8_lossy(text));
+            }
+        }
+    }
+
+    #[test]
+    fn a_quoted_field_that_fills_the_longest_row_to_its_last_byte_is_too_long() {
+        for length in [LONGEST - 3, LONGEST - 2, LONGEST - 1, LONGEST, LONGEST + 1] {
+            let text = format!("\"{}\n{}\n", "a".repeat(length - 2), "b".repeat(100));
+            let said = all(&mut opened(text.as_bytes(), ",", None)).unwrap_err().to_string();
+            assert!(said.contains("a row of more than 1 MiB"), "{length}: {said}");
+            assert_eq!(in_blocks(opened(text.as_bytes(), ",", None), 1 << 10), Err(said));
+        }
+        // A quote that is never closed is told at once, however many lines it takes in.
+        let said = all(&mut opened(format!("\"{}", "a\n".repeat(LONGEST)).as_bytes(), ",", None)).unwrap_err().to_string();
+        assert!(said.contains("a row of more than 1 MiB"), "{said}");
     }
 }

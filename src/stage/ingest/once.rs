@@ -10,14 +10,16 @@ use super::joined::JoinDecisions;
 use super::layout::{Duplicates, Join};
 use super::pair::{FileDecision, NONE};
 use super::reading::OpenedFile;
+use super::recorded::RecordedRow;
+use super::refusal::RowRefusal;
 use super::rejections::Rejections;
-use super::row::{RecordedRow, RowRefusal};
 use super::scan::{self, Scan};
 use super::verdict;
 use super::write::{self, RecordingChunks};
 use crate::error::Result;
 use crate::stage::{Context, StreamedTable};
 use crate::table::{Recording, Rejected, RejectedRow};
+use std::sync::Arc;
 
 /// Rejected rows that are held until it is clear that no second reading is needed; with more of them one is.
 const MOST_REJECTED: usize = 1 << 15;
@@ -32,7 +34,7 @@ pub(super) struct WrittenAhead<'a> {
 /// Reads the files of a measurement; rows are written meanwhile where `alone`: no other measurement follows.
 pub(super) fn read<'a>(
     settings: &Ingest,
-    arm: &RobotJoints,
+    arm: &Arc<RobotJoints>,
     alone: bool,
     context: &Context<'a>,
 ) -> Result<(Vec<Scan>, Option<WrittenAhead<'a>>)> {
@@ -95,7 +97,7 @@ fn may_be_used_as_they_come(settings: &Ingest) -> bool {
 /// Rows on their way to the table.
 struct Ahead<'a, 'b> {
     settings: &'b Ingest,
-    arm: &'b RobotJoints,
+    arm: &'b Arc<RobotJoints>,
     leading: usize,
     scans: Vec<Scan>,
     /// Of the file that is read: partners as far as it was read.
@@ -108,7 +110,7 @@ struct Ahead<'a, 'b> {
 impl<'a, 'b> Ahead<'a, 'b> {
     fn new(
         settings: &'b Ingest,
-        arm: &'b RobotJoints,
+        arm: &'b Arc<RobotJoints>,
         leading: usize,
         scans: Vec<Scan>,
         context: &Context<'a>,
@@ -166,7 +168,7 @@ impl<'a, 'b> Ahead<'a, 'b> {
         self.decision.partners.resize_with(self.scans.len() - 1, Vec::new);
         for (partners, other) in self.decision.partners.iter_mut().zip(&mut self.scans[1..]) {
             let partner = match &self.settings.join {
-                Some(Join::Id {}) if usable && !row.id.is_empty() => other.ids.row_of(&row.id),
+                Some(Join::Id {}) if usable && !row.id.is_empty() => other.ids.find(row.key),
                 Some(Join::Order {}) if usable && other.usable.get(row.number as usize - 1) == Some(&true) => {
                     Some(row.number as u32)
                 }

@@ -113,7 +113,7 @@ fn single(ids: &mut FileIds, duplicates: Duplicates, decisions: &mut [FileDecisi
 
 /// Pairs of rows with one id; every id once.
 fn by_id(first: &FileIds, second: &mut FileIds) -> Vec<(u32, u32)> {
-    first.keys().iter().filter_map(|key| Some((key.number, second.row_like(key)?))).collect()
+    first.keys().iter().filter_map(|key| Some((key.number, second.find((key.hash, key.check))?))).collect()
 }
 
 /// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
@@ -156,7 +156,8 @@ fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::row::RecordedRow;
+    use super::super::fingerprint::hash_of;
+    use super::super::recorded::RecordedRow;
     use super::*;
 
     fn times(times: &[f64]) -> Vec<(f64, u32)> {
@@ -183,8 +184,9 @@ mod tests {
         let stays = |duplicates| {
             let (mut ids, mut decisions) = (FileIds::default(), [FileDecision::default()]);
             for (id, number) in ["B", "A", "B", "B"].into_iter().zip(1..) {
-                let row = RecordedRow { id: id.into(), number, line: number + 1, ..RecordedRow::default() };
-                ids.push(&row, number, 0, "a.csv").unwrap();
+                let (key, content) = (hash_of(id), number);
+                let row = RecordedRow { id: id.into(), number, line: number + 1, key, content, ..RecordedRow::default() };
+                ids.push(&row, 0, "a.csv").unwrap();
             }
             single(&mut ids, duplicates, &mut decisions);
             let twins: Vec<(u32, u32)> = decisions[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();

@@ -2,12 +2,13 @@
 
 use super::arm::RobotJoints;
 use super::bind::{FileHeader, bind};
-use super::clock::ClockColumn;
 use super::encoding;
+use super::judging::JudgedFile;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
-use super::prefetch::Prefetched;
 use super::record::{BUFFER, FileFormat, RecordFields, RecordReader, failed};
-use super::row::{RecordedRow, RowReader, RowRefusal};
+use super::recorded::RecordedRow;
+use super::refusal::RowRefusal;
+use super::row::RowReader;
 use super::{lines, listing, parquet, workbook};
 use crate::error::{Error, Result, counted};
 use crate::raw;
@@ -15,6 +16,7 @@ use crate::stage::{Context, OpenedInput};
 use crate::table::RejectedRow;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::sync::Arc;
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
@@ -36,21 +38,17 @@ fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader
 }
 
 /// An opened file below its header.
-pub(super) struct OpenedFile<'a> {
+pub(super) struct OpenedFile {
     pub label: String,
-    rows: Prefetched,
+    pub rows: JudgedFile,
     /// What was left out of the file as a whole.
     remark: Option<String>,
-    pub record: RecordFields,
     pub row: RecordedRow,
-    reader: RowReader<'a>,
-    /// The record already holds the first row.
-    ahead: bool,
 }
 
-impl<'a> OpenedFile<'a> {
+impl OpenedFile {
     /// Opens a file and finds its columns.
-    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
+    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &Arc<RobotJoints>, limits: LimitPolicy) -> Result<Self> {
         let mut rows = open(source, layout)?;
         let label = rows.label().to_string();
         let (header, decimal) = if rows.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
@@ -78,25 +76,14 @@ impl<'a> OpenedFile<'a> {
             rows.skip(layout.skip_below_header)?;
         }
         let binding = bind(layout, &head, arm)?;
-        let reader = RowReader { binding, decimal, limits, arm, last_sequence: None, clock: ClockColumn::default() };
-        let (remark, rows) = (rows.remark(), Prefetched::new(rows));
-        Ok(Self { label, rows, remark, record, row: RecordedRow::default(), reader, ahead: !header })
-    }
-    /// Lines of the file read so far; of a Parquet file its rows.
-    pub(super) fn lines(&self) -> u64 {
-        self.rows.lines()
-    }
-    /// Bytes read so far.
-    pub(super) fn bytes(&self) -> u64 {
-        self.rows.bytes()
+        let row = RecordedRow::of(&binding, arm);
+        let (remark, first) = (rows.remark(), (!header).then_some(record));
+        let rows = JudgedFile::new(rows, first, RowReader::new(binding, decimal, limits, arm));
+        Ok(Self { label, rows, remark, row })
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.remark.iter().chain(&self.reader.binding.missing).cloned().collect()
-    }
-    /// The slots that the file fills, and what it lacks.
-    pub(super) fn binding(&self) -> &super::bind::Binding {
-        &self.reader.binding
+        self.remark.iter().chain(&self.rows.binding().missing).cloned().collect()
     }
     /// The present row as one that is not used, of the file that tables call `name`.
     pub(super) fn rejected(&self, name: &str, refusal: RowRefusal) -> RejectedRow {
@@ -106,27 +93,23 @@ impl<'a> OpenedFile<'a> {
             point_id: (!self.row.id.is_empty()).then(|| self.row.id.clone()),
             reason: refusal.reason.word().into(),
             detail: refusal.detail,
-            text: self.record.shown(),
+            text: self.rows.shown(),
         }
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {
-        if !std::mem::take(&mut self.ahead) && !self.rows.next(&mut self.record)? {
-            return Ok(None);
-        }
-        self.row.number += 1;
-        Ok(Some(self.reader.read(&self.record, &mut self.row)))
+        self.rows.next(&mut self.row)
     }
 }
 
 /// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
-pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: LimitPolicy, context: &Context) -> Result<()> {
+pub(super) fn header(layout: &FileLayout, arm: Option<&Arc<RobotJoints>>, limits: LimitPolicy, context: &Context) -> Result<()> {
     let source = context.services.open(&layout.file)?;
     if let Some(arm) = arm {
         return OpenedFile::open(source, layout, arm, limits).map(drop);
     }
     let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
-    let arm = RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
+    let arm = Arc::new(RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]));
     OpenedFile::open(source, &layout, &arm, limits).map(drop)
 }
 

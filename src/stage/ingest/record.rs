@@ -1,9 +1,10 @@
 //! One row of a raw file as it stands, and what a kind of file must do to hand out rows.
 
-use super::encoding;
 use super::layout::FileLayout;
 use crate::error::{Error, Result};
+use std::collections::VecDeque;
 use std::io::{BufReader, Read};
+use std::mem::take;
 use std::ops::Range;
 
 /// A file that is read from its first byte to its last.
@@ -25,6 +26,16 @@ pub(super) trait RecordReader: Send {
     /// Whether the settings say if names stand above the data, and how numbers are written; other files say it themselves.
     fn is_text(&self) -> bool {
         false
+    }
+    /// The rows that come next, as a reader of its own that another thread may read to its end; `None` at the end. Goes on behind what
+    /// [`next`](Self::next) read, and nothing else is asked for afterwards.
+    /// `room` is that of a block whose rows were used.
+    fn block(&mut self, _room: Vec<u8>) -> Result<Option<Box<dyn RecordReader>>> {
+        HeldRecords::of(self)
+    }
+    /// What a block that was read to its end leaves for another one.
+    fn room(self: Box<Self>) -> Vec<u8> {
+        Vec::new()
     }
     /// Skips lines below the header, where the file has lines.
     fn skip(&mut self, _lines: u64) -> Result<()> {
@@ -87,9 +98,53 @@ impl RecordFields {
     pub(super) fn is_blank(&self, from: usize) -> bool {
         (from..self.len()).all(|index| self.field(index).is_some_and(<[u8]>::is_empty))
     }
-    /// The row for people, cut at 200 characters.
-    pub(super) fn shown(&self) -> String {
-        encoding::shown(&self.text).chars().take(200).collect()
+}
+
+/// Rows that are held at a time, of a file that is not cut into blocks of its own.
+const HELD: usize = 1 << 11;
+
+/// Rows that were read, handed out once more.
+#[derive(Default)]
+pub(super) struct HeldRecords {
+    label: String,
+    records: VecDeque<RecordFields>,
+    /// Of the file up to the last of them.
+    lines: u64,
+    bytes: u64,
+}
+
+impl HeldRecords {
+    /// The next rows of a file; nothing at its end.
+    fn of(reader: &mut (impl RecordReader + ?Sized)) -> Result<Option<Box<dyn RecordReader>>> {
+        let mut records = VecDeque::with_capacity(HELD);
+        let mut record = RecordFields::default();
+        while records.len() < HELD && reader.next(&mut record)? {
+            records.push_back(take(&mut record));
+        }
+        if records.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Box::new(Self { label: reader.label().into(), records, lines: reader.lines(), bytes: reader.bytes() })))
+    }
+    /// One row alone, which a file of so many lines and bytes began with.
+    pub(super) fn one(record: RecordFields, reader: &dyn RecordReader) -> Self {
+        Self { label: reader.label().into(), records: [record].into(), lines: reader.lines(), bytes: reader.bytes() }
+    }
+}
+
+impl RecordReader for HeldRecords {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
+        let next = self.records.pop_front();
+        Ok(next.map(|next| *record = next).is_some())
+    }
+    fn lines(&self) -> u64 {
+        self.lines
+    }
+    fn bytes(&self) -> u64 {
+        self.bytes
     }
 }
 

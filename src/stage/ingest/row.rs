@@ -4,108 +4,85 @@ use super::arm::RobotJoints;
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use super::encoding;
+use super::fingerprint::{Fingerprints, RowHasher, hash_of};
+use super::judged::JudgedRows;
 use super::layout::{Decimal, LimitPolicy};
 use super::number::{self, NumberFault};
-use super::record::RecordFields;
+use super::record::{RecordFields, RecordReader};
+use super::recorded::RecordedRow;
+use super::refusal::{Reason, RowRefusal, refuse};
 use super::slots::KindSlots;
+use crate::error::Result as Fallible;
 use crate::robot::ONE_AND_A_HALF_TURNS;
+use std::sync::Arc;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 
-/// Why a row is not used; the stable word in the table `rejected`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reason {
-    Blank,
-    NotANumber,
-    NotText,
-    ShortRow,
-    LongRow,
-    LostBeam,
-    OutOfRange,
-    OutOfOrder,
-    DuplicateId,
-    DuplicateRow,
-    Unmatched,
-}
-
-impl Reason {
-    pub(super) fn word(self) -> &'static str {
-        match self {
-            Self::Blank => "blank",
-            Self::NotANumber => "not_a_number",
-            Self::NotText => "not_text",
-            Self::ShortRow => "short_row",
-            Self::LongRow => "long_row",
-            Self::LostBeam => "lost_beam",
-            Self::OutOfRange => "out_of_range",
-            Self::OutOfOrder => "out_of_order",
-            Self::DuplicateId => "duplicate_id",
-            Self::DuplicateRow => "duplicate_row",
-            Self::Unmatched => "unmatched",
-        }
-    }
-}
-
-/// A row that is not used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct RowRefusal {
-    pub reason: Reason,
-    pub detail: String,
-}
-
-fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
-    Err(RowRefusal { reason, detail })
-}
-
-/// The quantities of one row; reused from row to row.
-#[derive(Default)]
-pub(super) struct RecordedRow {
-    /// Number of the data row in its file, from 1.
-    pub number: u64,
-    pub line: u64,
-    /// Empty where there is none.
-    pub id: String,
-    /// By [`Slots::texts`]; empty where there is none.
-    ///
-    /// [`Slots::texts`]: super::slots::Slots::texts
-    pub texts: Vec<String>,
-    pub sequence: Option<i64>,
-    /// SI, by the places of the arm's slots; NaN where missing.
-    pub values: Vec<f64>,
-    /// Of a wide row the point of each target, SI; NaN where it was not seen.
-    pub points: Vec<[f64; 3]>,
-    /// The first joint beyond its limits, from 0.
-    pub beyond: Option<usize>,
-    /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
-    pub turned: Option<(usize, f64)>,
-}
-
 /// Reads rows of one file.
-pub(super) struct RowReader<'a> {
-    pub binding: Binding,
+#[derive(Clone)]
+pub(super) struct RowReader {
+    pub binding: Arc<Binding>,
     pub decimal: Decimal,
     pub limits: LimitPolicy,
-    pub arm: &'a RobotJoints,
+    pub arm: Arc<RobotJoints>,
+    pub asked: Fingerprints,
     /// Of the last usable row.
-    pub last_sequence: Option<i64>,
-    pub clock: ClockColumn,
+    last_sequence: Option<i64>,
+    clock: ClockColumn,
+    hasher: RowHasher,
 }
 
-impl RowReader<'_> {
+impl RowReader {
+    pub(super) fn new(binding: Binding, decimal: Decimal, limits: LimitPolicy, arm: &Arc<RobotJoints>) -> Self {
+        Self {
+            binding: Arc::new(binding),
+            decimal,
+            limits,
+            arm: arm.clone(),
+            asked: Fingerprints::default(),
+            last_sequence: None,
+            clock: ClockColumn::default(),
+            hasher: RowHasher::default(),
+        }
+    }
+
+    /// Whether what becomes of a row depends on those before it.
+    pub(super) fn looks_back(&self) -> bool {
+        self.binding.sequence.is_some() || self.binding.cells.iter().any(|cell| cell.is_clock)
+    }
+
+    /// Judges all rows of a block, and gives its room back.
+    pub(super) fn block(&mut self, mut block: Box<dyn RecordReader>, rows: &mut JudgedRows) -> Fallible<Vec<u8>> {
+        let binding = self.binding.clone();
+        let (mut record, mut row) = (RecordFields::default(), RecordedRow::of(&binding, &self.arm));
+        rows.clear();
+        while block.next(&mut record)? {
+            let judged = self.read(&record, &mut row);
+            if self.asked.ids {
+                row.key = hash_of(&row.id);
+            }
+            if self.asked.contents {
+                row.content = self.hasher.of(&row, &binding.filled);
+            }
+            rows.push(&binding, &record, &row, judged);
+        }
+        (rows.lines, rows.bytes) = (block.lines(), block.bytes());
+        Ok(block.room())
+    }
+
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
-    pub(super) fn read(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    fn read(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         row.id.clear();
-        row.texts.resize_with(self.binding.texts.len(), String::new);
-        row.texts.iter_mut().for_each(String::clear);
+        self.binding.worded.iter().for_each(|place| row.texts[*place].clear());
         row.sequence = None;
         row.beyond = None;
         row.turned = None;
         row.line = record.line;
         row.points.clear();
-        row.values.resize(self.arm.slots.count, f64::NAN);
         self.binding.filled.iter().for_each(|place| row.values[*place] = f64::NAN);
-        if record.is_blank(0) {
+        row.is_blank = record.is_blank(0);
+        if row.is_blank {
             return refuse(Reason::Blank, "the whole row is blank".into());
         }
         let width = self.binding.width;
@@ -117,8 +94,8 @@ impl RowReader<'_> {
         if !record.is_blank(width) {
             return refuse(Reason::LongRow, format!("{} fields; allowed: {width}", record.len()));
         }
-        for ((source, name), into) in self.binding.texts.iter().zip(self.arm.slots.texts()).zip(&mut row.texts) {
-            text(source, record, name, true, into)?;
+        for place in &self.binding.worded {
+            text(&self.binding.texts[*place], record, self.arm.slots.texts()[*place], true, &mut row.texts[*place])?;
         }
         for (index, value) in &self.binding.constants {
             if let Some(slot) = row.values.get_mut(*index) {

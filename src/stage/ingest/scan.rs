@@ -5,16 +5,18 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
+use super::fingerprint::{Fingerprints, behind};
 use super::ids::{FileIds, narrow};
 use super::layout::{FileLayout, Join};
 use super::motion::{JointSamples, Track};
 use super::reading::{OpenedFile, ProgressCounter};
-use super::row::{Reason, RecordedRow, RowRefusal};
+use super::recorded::RecordedRow;
+use super::refusal::{Reason, RowRefusal};
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use twox_hash::XxHash3_128;
+use std::sync::Arc;
 
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
@@ -63,9 +65,9 @@ impl PackedRows {
     /// No rows of an opened file.
     fn of(reading: &OpenedFile, layout: &FileLayout, arm: &RobotJoints) -> Self {
         Self {
-            slots: reading.binding().slots(),
+            slots: reading.rows.binding().slots(),
             texts: arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect(),
-            targets: reading.binding().points.len(),
+            targets: reading.rows.binding().points.len(),
             ..Self::default()
         }
     }
@@ -142,25 +144,20 @@ impl Scan {
 }
 
 /// A file below its header, with its size in bytes where that is known.
-pub(super) struct ScannedFile<'a> {
-    reading: OpenedFile<'a>,
+pub(super) struct ScannedFile {
+    reading: OpenedFile,
     size: Option<u64>,
 }
 
-impl ScannedFile<'_> {
+impl ScannedFile {
     /// What is known before the first row.
     pub(super) fn beginning(&self) -> Scan {
-        Scan::new(self.reading.label.clone(), self.reading.binding().slots(), None)
+        Scan::new(self.reading.label.clone(), self.reading.rows.binding().slots(), None)
     }
 }
 
 /// Opens a file and says what is odd about it.
-pub(super) fn open<'a>(
-    settings: &Ingest,
-    layout: &FileLayout,
-    arm: &'a RobotJoints,
-    context: &Context,
-) -> Result<ScannedFile<'a>> {
+pub(super) fn open(settings: &Ingest, layout: &FileLayout, arm: &Arc<RobotJoints>, context: &Context) -> Result<ScannedFile> {
     let source = context.services.open(&layout.file)?;
     let size = source.size;
     let reading = OpenedFile::open(source, layout, arm, settings.limits)?;
@@ -186,16 +183,17 @@ pub(super) fn scan(
     let label = reading.label.clone();
     context.services.begin(&format!("reading {label}"), size, "bytes");
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
-    let slots = reading.binding().slots();
+    let slots = reading.rows.binding().slots();
     let packed = (joined && index > 0).then(|| PackedRows::of(&reading, layout, arm));
     let mut scan = Scan::new(label, slots, packed);
-    scan.measured = reading.binding().measures.then_some(0);
+    scan.measured = reading.rows.binding().measures.then_some(0);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
     let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    let (mut pace, mut contents) = (ProgressCounter::new(context), RowHasher::default());
+    reading.rows.fingerprint(Fingerprints { ids: keyed, contents: keyed || scan.measured.is_some() });
+    let mut pace = ProgressCounter::new(context);
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
         if let Some((joint, angle)) = row.turned {
@@ -203,16 +201,14 @@ pub(super) fn scan(
         }
         match &judged {
             Ok(()) => {
-                let identified = keyed && !row.id.is_empty();
-                let content = if identified || scan.measured.is_some() { contents.of(row, &reading.binding().filled) } else { 0 };
-                if identified {
-                    scan.ids.push(row, content, index, &scan.label)?;
+                if keyed && !row.id.is_empty() {
+                    scan.ids.push(row, index, &scan.label)?;
                 }
                 if matches!(settings.join, Some(Join::Id {})) && scan.first_ids.len() < EXAMPLES {
                     scan.first_ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(before) = &mut scan.measured {
-                    *before = contents.behind(*before, row.number, content);
+                    *before = behind(*before, row.number, row.content);
                 }
                 if timed {
                     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
@@ -231,14 +227,14 @@ pub(super) fn scan(
         if let Some(packed) = &mut scan.packed {
             packed.push(row, named);
         }
-        if !reading.record.is_blank(0) {
+        if !reading.row.is_blank {
             scan.last = row.number;
         }
         watch(&reading, &judged);
-        pace.row(reading.bytes());
+        pace.row(reading.rows.bytes());
     }
-    context.services.advance(reading.bytes(), "");
-    scan.lines = reading.lines();
+    context.services.advance(reading.rows.bytes(), "");
+    scan.lines = reading.rows.lines();
     scan.read = reading.row.number;
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
@@ -262,44 +258,6 @@ fn sample(samples: &mut JointSamples, row: &RecordedRow, layout: &FileLayout, ar
     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
     let given = if layout.columns.has("velocity") { all(&arm.slots.velocity) } else { &[] };
     samples.push(row.number, time, all(&arm.slots.q), given);
-}
-
-/// Makes hashes of what rows say; its room is used again.
-#[derive(Default)]
-struct RowHasher {
-    bytes: Vec<u8>,
-}
-
-impl RowHasher {
-    /// Hash of the numbers, points and texts of a row; numbers stand in these places.
-    fn of(&mut self, row: &RecordedRow, places: &[usize]) -> u64 {
-        self.bytes.clear();
-        // What a row lacks says nothing: a circumstance more that may be declared costs a row nothing.
-        for place in places {
-            let value = row.values[*place];
-            if !value.is_nan() {
-                self.bytes.extend_from_slice(&(*place as u64).to_le_bytes());
-                self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
-            }
-        }
-        for value in row.points.iter().flatten() {
-            self.bytes.extend_from_slice(&value.to_bits().to_le_bytes());
-        }
-        for (place, text) in row.texts.iter().enumerate().filter(|(_, text)| !text.is_empty()) {
-            self.bytes.extend_from_slice([place, text.len()].map(|number| (number as u64).to_le_bytes()).as_flattened());
-            self.bytes.extend_from_slice(text.as_bytes());
-        }
-        XxHash3_128::oneshot(&self.bytes) as u64
-    }
-
-    /// Hash of rows and of one more.
-    fn behind(&mut self, before: u128, number: u64, content: u64) -> u128 {
-        self.bytes.clear();
-        self.bytes.extend_from_slice(&before.to_le_bytes());
-        self.bytes.extend_from_slice(&number.to_le_bytes());
-        self.bytes.extend_from_slice(&content.to_le_bytes());
-        XxHash3_128::oneshot(&self.bytes)
-    }
 }
 
 impl Scan {

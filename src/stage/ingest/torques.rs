@@ -7,8 +7,9 @@ use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
 use super::reading::{self, OpenedFile, ProgressCounter};
+use super::recorded::RecordedRow;
+use super::refusal::{Reason, RowRefusal};
 use super::rejections::Rejections;
-use super::row::{Reason, RecordedRow, RowRefusal};
 use super::scan::{RefusalCounts, tally};
 use super::stretch::Stretches;
 use crate::error::{Error, Fault, Result, counted};
@@ -17,6 +18,7 @@ use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, T
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Reads recordings of joint torques or motor currents of a moving arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -111,7 +113,7 @@ impl Stage for IngestTorques {
     }
 
     fn look(&self, reads: Option<IngestTorquesReads>, context: &Context) -> Result<Option<IngestTorquesWrites>> {
-        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?;
+        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?.map(Arc::new);
         let mut faults = Vec::new();
         for layout in &self.files {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -127,7 +129,7 @@ impl Stage for IngestTorques {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        let arm = RobotJoints::of(&reads.robot)?;
+        let arm = Arc::new(RobotJoints::of(&reads.robot)?);
         let names: Vec<String> = self.files.iter().map(|file| own_name(&file.file.0)).collect();
         let mut rejected = Rejections::new(&names, context)?;
         let mut rows = MotionRows::new(self, &reads.robot, &arm, context)?;
@@ -147,7 +149,7 @@ fn own_name(path: &Path) -> String {
 /// The table of motion, chunk by chunk.
 struct MotionRows<'a> {
     settings: &'a IngestTorques,
-    arm: &'a RobotJoints,
+    arm: &'a Arc<RobotJoints>,
     sink: Box<dyn Sink + 'a>,
     chunk: ArmMotion,
     written: i64,
@@ -163,7 +165,7 @@ struct MotionRows<'a> {
 }
 
 impl<'a> MotionRows<'a> {
-    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a RobotJoints, context: &Context<'a>) -> Result<Self> {
+    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a Arc<RobotJoints>, context: &Context<'a>) -> Result<Self> {
         let joints = robot.0.iter().filter(|row| row.kind == "revolute" || row.kind == "prismatic");
         let ratio = joints.map(|row| match (settings.torque_side, row.reduction_ratio) {
             (TorqueSide::Joint, _) => Ok(1.0),
@@ -197,7 +199,7 @@ impl<'a> MotionRows<'a> {
         let label = open.label.clone();
         context.services.begin(&format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
-        let given = open.binding().slots();
+        let given = open.rows.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let optional = [has("velocity"), has("temperature")];
         self.agree(optional, &label)?;
@@ -212,24 +214,17 @@ impl<'a> MotionRows<'a> {
                 }
                 Err(refusal) => {
                     tally(&mut refused, open.row.line, &refusal);
-                    rejected.push(RejectedRow {
-                        file: name.into(),
-                        line: open.row.line as i64,
-                        point_id: None,
-                        reason: refusal.reason.word().into(),
-                        detail: refusal.detail,
-                        text: open.record.shown(),
-                    })?;
+                    rejected.push(RejectedRow { point_id: None, ..open.rejected(name, refusal) })?;
                 }
             }
-            pace.row(open.bytes());
+            pace.row(open.rows.bytes());
         }
         let read = open.row.number;
         self.few_rejected(&label, read, accepted, &refused)?;
         context.services.note(format!("{name}: {} read, {accepted} used, {} rejected", counted(read, "row"), read - accepted));
         Ok(IntakeRow {
             file: name.into(),
-            lines: open.lines() as i64,
+            lines: open.rows.lines() as i64,
             read: read as i64,
             accepted: accepted as i64,
             rejected: (read - accepted) as i64,
@@ -238,7 +233,7 @@ impl<'a> MotionRows<'a> {
 
     /// Which of currents and torques a file has: one of them, and the same in each file.
     fn signal_of(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
-        let given = open.binding().slots();
+        let given = open.rows.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let own = match (has("torque"), has("current")) {
             (true, false) => "torque",
@@ -247,7 +242,7 @@ impl<'a> MotionRows<'a> {
                 return Err(Error::data(label, "has torques and currents; map one of them: the other would not be used"));
             }
             (false, false) => {
-                let lacks = open.binding().missing.join("; ");
+                let lacks = open.rows.binding().missing.join("; ");
                 return Err(Error::data(label, format!("has neither torques nor motor currents of the joints: {lacks}")));
             }
         };

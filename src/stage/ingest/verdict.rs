@@ -5,7 +5,7 @@ use super::arm::RobotJoints;
 use super::columns::Columns;
 use super::layout::{Join, LimitPolicy};
 use super::pair::FileDecision;
-use super::row::Reason;
+use super::refusal::Reason;
 use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;

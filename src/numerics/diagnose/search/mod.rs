@@ -99,9 +99,8 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
         let mut beam = vec![best.clone()];
         let mut first = None;
         let mut last = 1.0;
-        // What is pruned may be added again: a set that was there before ends the climb.
-        let mut seen = BTreeSet::new();
-        while best.len() < self.options.most && seen.insert(self.pool.bic(&best).to_bits()) {
+        let mut trail = ClimbTrail::default();
+        while best.len() < self.options.most && trail.is_new(self.pool.bic(&best)) {
             self.multiply(&best);
             last = self.gate(&best);
             first.get_or_insert(last);
@@ -189,6 +188,17 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
     }
 }
 
+/// Where a climb has been, by the criterion. What is pruned may be added again: a climb that comes back is at its end.
+#[derive(Default)]
+struct ClimbTrail(BTreeSet<u64>);
+
+impl ClimbTrail {
+    /// Whether the climb was never there; from now on it was.
+    fn is_new(&mut self, bic: f64) -> bool {
+        self.0.insert(bic.to_bits())
+    }
+}
+
 /// The hypotheses that lower the criterion most, one of a key, best first.
 fn best(pool: &CachedHypotheses, given: &Conditional, most: usize) -> Vec<usize> {
     let mut keys = BTreeSet::new();
@@ -205,4 +215,22 @@ fn with(set: &[usize], h: usize) -> Vec<usize> {
     out.push(h);
     out.sort_unstable();
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_climb_that_adds_and_prunes_the_same_cause_again_and_again_ends() {
+        // Adding the second cause makes the first superfluous, pruning that makes room for it again.
+        let (criteria, mut at, mut steps) = ([120.0, 80.0, 70.25, 79.5], 0, 0);
+        let mut trail = ClimbTrail::default();
+        while trail.is_new(criteria[at]) {
+            at = if at == 3 { 1 } else { at + 1 };
+            steps += 1;
+            assert!(steps <= criteria.len(), "the climb goes in a circle");
+        }
+        assert_eq!((at, steps), (1, 4));
+    }
 }

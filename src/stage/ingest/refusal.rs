@@ -1,0 +1,46 @@
+//! Why a row is not used.
+
+/// Why a row is not used; the stable word in the table `rejected`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reason {
+    Blank,
+    NotANumber,
+    NotText,
+    ShortRow,
+    LongRow,
+    LostBeam,
+    OutOfRange,
+    OutOfOrder,
+    DuplicateId,
+    DuplicateRow,
+    Unmatched,
+}
+
+impl Reason {
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Blank => "blank",
+            Self::NotANumber => "not_a_number",
+            Self::NotText => "not_text",
+            Self::ShortRow => "short_row",
+            Self::LongRow => "long_row",
+            Self::LostBeam => "lost_beam",
+            Self::OutOfRange => "out_of_range",
+            Self::OutOfOrder => "out_of_order",
+            Self::DuplicateId => "duplicate_id",
+            Self::DuplicateRow => "duplicate_row",
+            Self::Unmatched => "unmatched",
+        }
+    }
+}
+
+/// A row that is not used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct RowRefusal {
+    pub reason: Reason,
+    pub detail: String,
+}
+
+pub(super) fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
+    Err(RowRefusal { reason, detail })
+}
