@@ -1,10 +1,10 @@
 //! On which side of shoulder, elbow and wrist an arm stands: what tells the joint positions apart that reach one pose.
 //!
 //! They are those of an arm of six revolute joints, with parallel axes 2 and 3 and a wrist whose axes meet in a point, the wrist centre.
-//! Shoulder: the wrist
-//! centre is in front of axis 1, which is where it is when the controller shows zeros, or behind it. Elbow: the wrist centre is beyond the
-//! line from axis 2 to axis 3 in the direction in which the controller counts joint 3 upwards, or short of it. Wrist: joint 5 is turned
-//! upwards, as the controller counts, from where axes 4 and 6 are in line, or downwards. These are bits 0 to 2 of KUKA's status and ABB's cfx.
+//! Shoulder: the wrist centre is in front of axis 1, which is where it is when the controller shows zeros, or behind it. Elbow: the wrist centre
+//! is beyond the line from axis 2 to axis 3 in the direction in which the controller counts joint 3 upwards, or short of it. Wrist: joint 5 is
+//! turned upwards, as the controller counts, from where axes 4 and 6 are in line, or downwards. These are bits 0 to 2 of KUKA's status and
+//! ABB's cfx.
 
 use crate::robot::{JointConvention, RobotModel, Travel};
 use nalgebra::{Matrix3, Vector3};

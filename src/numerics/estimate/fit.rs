@@ -43,7 +43,7 @@ pub enum ParameterStatus {
 /// What [`fit`] says of the model that it returns.
 #[derive(Clone)]
 pub struct Fitted {
-    /// What became of every parameter of the stack.
+    /// The state of every parameter of the stack.
     pub statuses: Vec<ParameterStatus>,
     /// Step by step.
     pub course: Vec<Iteration>,

@@ -32,7 +32,7 @@ pub(super) fn cut(text: &[u8], delimiter: Delimiter, comment: Option<&[u8]>) -> 
     whole
 }
 
-/// Whether a quoted field goes on.
+/// Whether a quoted field is still open.
 pub(super) struct OpenQuote {
     pub inside: bool,
     /// A quote opens a field here.

@@ -124,7 +124,7 @@ impl JudgingThreads {
         Some(judged)
     }
 
-    /// Waits for all; a panic of one goes on here.
+    /// Waits for all; a panic of one is resumed here.
     fn end(self) -> Result<()> {
         // Nobody listens any more: all of them end.
         let judges: Vec<JoinHandle<()>> = self.judges.into_iter().map(|judge| judge.handle).collect();

@@ -27,7 +27,7 @@ pub(super) trait RecordReader: Send {
     fn is_text(&self) -> bool {
         false
     }
-    /// The rows that come next, as a reader of its own that another thread may read to its end; `None` at the end. Goes on behind what
+    /// The rows that come next, as a reader of its own that another thread may read to its end; `None` at the end. Continues behind what
     /// [`next`](Self::next) read, and nothing else is asked for afterwards.
     /// `room` is that of a block whose rows were used.
     fn block(&mut self, _room: Vec<u8>) -> Result<Option<Box<dyn RecordReader>>> {
