@@ -39,6 +39,8 @@ criteria! {
     KNOTS: usize = 48, "places", "judgement: bounds time; the best are refined", "";
     /// Places around a knot that are tried in the end.
     CLOSER_KNOTS: usize = 8, "places", "judgement: bounds time", "";
+    /// Rows between two knots, and beyond the last, for each number that is fitted there.
+    BETWEEN_KNOTS: usize = 3, "rows a number", "judgement: one wrong row makes no jump", "";
     /// Steps in time that are tried.
     STEPS: usize = 40, "steps", "judgement: bounds time; the best is refined", "";
     /// Limits at which what sticks slips.

@@ -299,7 +299,10 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
     let passing = || PASSING.map(|of| (of, if of == Variable::Time { *FINE } else { *COARSE })).into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
-    let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, *COARSE));
+    let loads = |own: [usize; 2]| {
+        let of = move |joint: usize| (Variable::Load { joint }, if own.contains(&joint) { *COARSE } else { *SKETCH });
+        (0..joints).filter(|joint| survey.is_loaded(*joint)).map(of)
+    };
     let moved = |joint: usize| {
         let own = moved(joint, survey).map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }));
         own.chain(others(joint, survey))
@@ -308,7 +311,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     match place {
         Place::Joint(joint) => {
             let own: Vec<_> =
-                angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain(moved(joint)).chain(space()).collect();
+                angles(joint).chain(passing()).chain(sides()).chain(loads([joint; 2])).chain(moved(joint)).chain(space()).collect();
             let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { *FINEST } else { *count }));
             let mut out = vec![(Motion::Joint { joint }, finest.collect())];
             if survey.robot.is_revolute(joint) {
@@ -319,7 +322,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
             out
         }
         Place::Links(link, _) => {
-            let loads = load(link).into_iter().chain(load(link + 1));
+            let loads = loads([link, link + 1]);
             let own: Vec<_> =
                 angles(joints).chain(passing()).chain(sides()).chain(loads).chain(moved(link)).chain(space()).collect();
             vec![(Motion::Links { first: link, last: link }, own.clone()), (Motion::Bend { link }, own)]
@@ -335,12 +338,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         Place::Tool => {
             let gravity = (0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, *COARSE));
             let last = joints.saturating_sub(1);
+            let gravity = gravity.chain(loads([last; 2]));
             let own: Vec<_> =
                 angles(last).chain(passing()).chain(sides()).chain(gravity).chain(moved(last)).chain(space()).collect();
             vec![(Motion::Tool { axes: Axes::Place }, own)]
         }
         _ => {
-            let loads = (0..joints).filter_map(load);
+            let loads = loads([0, 1]);
             let own: Vec<_> = angles(0).chain(passing()).chain(sides()).chain(loads).chain(moved(0)).chain(space()).collect();
             [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
         }

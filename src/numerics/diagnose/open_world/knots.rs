@@ -5,7 +5,7 @@ use super::evidence::evidence;
 use super::frame::GroupProducts;
 use super::groups::{FreeGroup, GroupColumns};
 use super::state::KnownCauses;
-use crate::criteria::open_world::{CLOSER_KNOTS, KNOTS, PAYS};
+use crate::criteria::open_world::{BETWEEN_KNOTS, CLOSER_KNOTS, KNOTS, PAYS};
 use crate::effect::{Basis, Factor, Knots, Law, Variable};
 use nalgebra::{DMatrix, DVector};
 
@@ -30,10 +30,10 @@ pub(super) fn with_knots(group: &FreeGroup, state: &KnownCauses, columns: &mut G
         let Some(mut values) = columns.values(of.of).map(<[f64]>::to_vec) else { continue };
         values.sort_by(f64::total_cmp);
         let ends = [values[0], values[values.len() - 1]];
-        values.dedup_by(|a, b| *a - *b < 1e-9 * (ends[1] - ends[0]));
-        let between: Vec<f64> = values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        let apart = |pair: &&[f64]| pair[1] - pair[0] > 1e-9 * (ends[1] - ends[0]);
+        let between: Vec<f64> = values.windows(2).filter(apart).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         for piece in [Piece::Level, Piece::Straight] {
-            let search = KnotSearch { group, of, other, ends, piece, state, columns: &mut *columns };
+            let search = KnotSearch { group, of, other, values: &values, piece, state, columns: &mut *columns };
             out.extend(search.group_with(&between));
         }
     }
@@ -53,7 +53,8 @@ struct KnotSearch<'k, 'f, 'a, 's> {
     group: &'k FreeGroup,
     of: Factor,
     other: Option<Factor>,
-    ends: [f64; 2],
+    /// At the rows, ascending.
+    values: &'k [f64],
     piece: Piece,
     state: &'k KnownCauses<'s>,
     columns: &'k mut GroupColumns<'f, 'a>,
@@ -75,7 +76,7 @@ impl KnotSearch<'_, '_, '_, '_> {
         closer.dedup();
         let found = self.best(&closer).unwrap_or(first);
         let choices = found.iter().fold(self.group.of, |all: usize, _| all.saturating_mul(coarse.len()));
-        let ends = self.ends.into_iter().filter(|_| self.piece == Piece::Straight);
+        let ends = self.ends().into_iter().filter(|_| self.piece == Piece::Straight);
         let knots = Knots::new(found.iter().copied().chain(ends));
         let basis = if self.piece == Piece::Level { Basis::Steps { knots } } else { Basis::Corners { knots } };
         let law = Law::new(self.of.of, basis);
@@ -83,25 +84,41 @@ impl KnotSearch<'_, '_, '_, '_> {
         Some(FreeGroup { law, of: choices, ..*self.group })
     }
 
+    fn ends(&self) -> [f64; 2] {
+        [self.values[0], self.values[self.values.len() - 1]]
+    }
+
+    /// How many rows are below a value.
+    fn rows_below(&self, at: f64) -> usize {
+        self.values.partition_point(|value| *value < at)
+    }
+
     /// The knots out of some that pay, ascending; none where none does.
     fn best(&mut self, places: &[f64]) -> Option<Vec<f64>> {
         // A straight line is no corner, and belongs to all of them.
-        let line = (self.piece == Piece::Straight).then_some(self.ends[0]);
+        let line = (self.piece == Piece::Straight).then_some(self.ends()[0]);
         let all: Vec<f64> = line.into_iter().chain(places.iter().copied()).collect();
         let seen = self.products(&all)?;
+        // A few rows that are wrong make no jump.
+        let least = *BETWEEN_KNOTS * seen.columns[0].len();
+        let below: Vec<usize> = all.iter().map(|knot| self.rows_below(*knot)).collect();
+        let sound = |k: usize, others: &[usize]| {
+            let ends = [0, self.values.len()].into_iter();
+            ends.chain(others.iter().map(|other| below[*other])).all(|other| other.abs_diff(below[k]) >= least)
+        };
         let most = Knots::MOST - 2 * usize::from(line.is_some());
         let price = (places.len() as f64).ln();
         let (mut chosen, mut log) = (Vec::from_iter(line.map(|_| 0)), f64::NEG_INFINITY);
         let fixed = chosen.len();
         while chosen.len() < fixed + most {
-            let free = (fixed..all.len()).filter(|k| !chosen.contains(k));
+            let free = (fixed..all.len()).filter(|k| sound(*k, &chosen[fixed..]));
             let with = |k: usize| seen.evidence(&[&chosen[..], &[k]].concat());
             let Some((k, value)) = free.map(|k| (k, with(k))).max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
             if value - price < log + *PAYS {
                 break;
             }
             chosen.push(k);
-            log = seen.settle(&mut chosen, fixed, value) - price;
+            log = seen.settle(&mut chosen, (fixed, value), &sound) - price;
         }
         let mut knots: Vec<f64> = chosen[fixed..].iter().map(|k| all[*k]).collect();
         knots.sort_by(f64::total_cmp);
@@ -110,10 +127,10 @@ impl KnotSearch<'_, '_, '_, '_> {
 
     /// Products of the columns of one knot each, beside the state.
     fn products(&mut self, knots: &[f64]) -> Option<KnotProducts> {
+        let [low, high] = self.ends();
         let values = self.columns.values(self.of.of)?;
-        let way = self.ends[1] - self.ends[0];
         let function = |knot: &f64| -> Vec<f64> {
-            let at = |u: &f64| if self.piece == Piece::Level { f64::from(u > knot) } else { (u - knot).max(0.0) / way };
+            let at = |u: &f64| if self.piece == Piece::Level { f64::from(u > knot) } else { (u - knot).max(0.0) / (high - low) };
             values.iter().map(at).collect()
         };
         let mut functions: Vec<Vec<f64>> = knots.iter().map(function).collect();
@@ -151,14 +168,13 @@ impl KnotProducts {
         evidence(&gram, &gradient, &vec![1.0 / size.max(f64::MIN_POSITIVE); own.len()]).log
     }
 
-    /// Moves each of the free knots to where the evidence of all is largest, and returns it.
-    fn settle(&self, chosen: &mut [usize], fixed: usize, mut log: f64) -> f64 {
+    /// Moves each of the free knots to where the evidence of all is largest, as far as a place is `sound` beside the others; returns that
+    /// evidence.
+    fn settle(&self, chosen: &mut [usize], (fixed, mut log): (usize, f64), sound: &dyn Fn(usize, &[usize]) -> bool) -> f64 {
         for at in fixed..chosen.len().saturating_sub(1) {
-            for k in fixed..self.columns.len() {
+            let others: Vec<usize> = (fixed..chosen.len()).filter(|other| *other != at).map(|other| chosen[other]).collect();
+            for k in (fixed..self.columns.len()).filter(|k| sound(*k, &others)) {
                 let old = chosen[at];
-                if chosen.contains(&k) {
-                    continue;
-                }
                 chosen[at] = k;
                 let value = self.evidence(chosen);
                 if value > log {

@@ -15,11 +15,13 @@ pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
     of_the_recording(names::JOINT_LOG_LAG, text, last)
 }
 
-/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
-pub(super) fn faults(last: &LastRound, unknown: Option<usize>) -> Vec<Finding> {
+/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell. Where physics is
+/// left, a row that only the model speaks against may be where that shows most.
+pub(super) fn faults(last: &LastRound, unknown: Option<usize>, something_left: bool) -> Vec<Finding> {
     let screening = &last.judged.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
-    let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
+    let far =
+        |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach && (s.corroborated || !something_left);
     let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
         let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
         own.filter(|s| far(s)).map(|s| s.row + 1).collect()

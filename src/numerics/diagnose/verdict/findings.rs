@@ -19,8 +19,8 @@ use crate::effect::{
 use crate::estimate::{ErrorScale, Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 
-/// The causes of the last round as findings, strongest first.
-pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
+/// The causes of the last round as findings, strongest first; `something_left` says whether they leave more than noise.
+pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
     let state = &last.judged.state;
     if let Some(offset) = state.screening.apart {
         let mut apart = rows_apart(offset, last);
@@ -50,7 +50,7 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     };
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
-    let mut faults = faults(last, unknown);
+    let mut faults = faults(last, unknown, something_left);
     faults.iter_mut().for_each(weigh_fault);
     out.extend(faults);
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);

@@ -94,7 +94,7 @@ impl Index {
         Self { by_x }
     }
 
-    /// Rows whose joints fit the point of `row` far better than its own, with their distance (m).
+    /// Rows of other poses whose joints fit the point of `row` far better than its own, with their distance (m).
     fn fits(&self, data: &Measurements, standings: &[LeaveOneOut], row: usize, limit: f64) -> Vec<(usize, f64)> {
         let Some(point) = data.point(row) else { return Vec::new() };
         let own = &standings[row];
@@ -104,7 +104,7 @@ impl Index {
         let slab = self.by_x[start..].iter().take_while(|(x, _)| *x <= point.x + reach);
         let mut found: Vec<(usize, f64)> = slab
             .map(|(_, other)| (*other, (point - standings[*other].predicted).norm()))
-            .filter(|(other, distance)| *other != row && *distance <= reach)
+            .filter(|(other, distance)| *distance <= reach && !data.near_pose(row, *other))
             .collect();
         found.sort_by_key(|(other, _)| (other.abs_diff(row), *other));
         found.truncate(*CANDIDATES);

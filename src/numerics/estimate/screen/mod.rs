@@ -33,6 +33,8 @@ pub struct Suspect {
     pub size: f64,
     /// The same, leave-one-out, in standard deviations of the row's own set.
     pub statistic: f64,
+    /// Whether more than the model speaks against the row.
+    pub corroborated: bool,
 }
 
 impl Suspect {
@@ -153,19 +155,21 @@ fn screen(
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
     named.extend(beside(data, &named));
     let crowded = crowded(data, &named, set);
+    // What a free form does not follow is its own fault before it is a row's.
+    let nameless = model.stack.effects().filter_map(|(effect, _)| effect.form()).any(|form| form.cause().is_nameless());
     let mut crowd = 0;
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let LeaveOneOut { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
         // A row that judges the model is not set aside by the model alone.
-        let judges = asked.binary_search(&row).is_err();
-        let uncorroborated = judges && !corroborated::is_wrong(data, row, residual.norm());
+        let needs_more = nameless || asked.binary_search(&row).is_err();
+        let corroborated = corroborated::is_wrong(data, row, residual.norm());
         let among_many = crowded.contains(&set[row]) && *distance < *BEYOND_CROWD * limit && !held.contains(&row);
-        if kind == SuspectKind::Outlier && (uncorroborated || among_many) {
+        if kind == SuspectKind::Outlier && (needs_more && !corroborated || among_many) {
             crowd += 1;
         } else {
-            suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
+            suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance, corroborated });
         }
     }
     let followed: BTreeSet<usize> = slipped.keys().copied().filter(|row| standings[*row].distance <= limit).collect();
@@ -176,6 +180,7 @@ fn screen(
         partner: row.checked_add_signed(*offset as isize).filter(|row| *row < data.rows()),
         size: standings[*row].residual.norm(),
         statistic: standings[*row].distance,
+        corroborated: true,
     }));
     suspects.sort_by_key(|suspect| suspect.row);
     Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()), followed }
