@@ -11,6 +11,8 @@ criteria! {
     GROUPS: usize = 4, "groups", "judgement: bounds time", "";
     /// ln of the evidence by which a further group must pay for itself, beyond the price of its choice.
     PAYS: f64 = 1.0, "ln of evidence", "literature: barely worth a mention, Jeffreys (1961)", "changes nothing on 2";
+    /// ln of the evidence by which jumps and corners must be better than a smooth curve.
+    JUMPS: f64 = 10.0, "ln of evidence", "literature: twice very strong, Kass and Raftery (1995)", "";
     /// How often the number of a group's variable is halved in its step.
     LEVELS: i32 = 4, "levels", "judgement: bounds time", "";
     /// Groups whose shorter lengths are looked at.

@@ -6,7 +6,7 @@ use super::groups::{FreeGroup, GroupColumns};
 use super::knots::with_knots;
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
-use crate::criteria::open_world::{CLOSER, GROUPS, LEVELS, PAYS};
+use crate::criteria::open_world::{CLOSER, GROUPS, JUMPS, LEVELS, PAYS};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -170,7 +170,7 @@ impl PlaceGroups {
             let first = self.groups.len();
             self.groups.push(self.groups[g].clone());
             let begun = self.exchanged((first, f64::NEG_INFINITY), alike, columns, beside);
-            let other = self.shaped((first, begun), columns, beside);
+            let other = self.shaped((first, begun.unwrap_or(f64::NEG_INFINITY)), columns, beside);
             if other > log {
                 log = other;
                 self.groups.swap(g, first);
@@ -188,13 +188,13 @@ impl PlaceGroups {
             if near.is_empty() {
                 break;
             }
-            log = self.exchanged((g, log), near, columns, beside);
+            log = self.exchanged((g, log), near, columns, beside).unwrap_or(log);
         }
-        let mut shaped: Vec<FreeGroup> = columns.finer(&self.groups[g].group).into_iter().collect();
-        shaped.extend(with_knots(&self.groups[g].group, beside.state, columns));
-        // Of equal ones the plainer.
-        let best = self.exchanged((g, log + *PAYS), shaped, columns, beside);
-        if best > log + *PAYS { best } else { log }
+        // Of equal ones the plainer; most curves have no jumps.
+        let finer = columns.finer(&self.groups[g].group).into_iter().collect();
+        log = self.exchanged((g, log + *PAYS), finer, columns, beside).unwrap_or(log);
+        let knotted = with_knots(&self.groups[g].group, beside.state, columns);
+        self.exchanged((g, log + *JUMPS), knotted, columns, beside).unwrap_or(log)
     }
 
     /// ln of the evidence of a group beside a state without the price of its place among others like it; none of an amplitude that no arm has.
@@ -203,14 +203,14 @@ impl PlaceGroups {
         if found.is_off_the_grid() { f64::NEG_INFINITY } else { found.log - (self.groups[g].group.of as f64).ln() }
     }
 
-    /// Puts the best of other groups in the place of one whose evidence is `log`, if it says more; returns the evidence of what stands there.
+    /// Puts the best of other groups in the place of one, if its evidence is more than `log`, and returns it.
     fn exchanged(
         &mut self,
         (g, log): (usize, f64),
         others: Vec<FreeGroup>,
         columns: &mut GroupColumns,
         beside: &BesideTerms,
-    ) -> f64 {
+    ) -> Option<f64> {
         let first = self.groups.len();
         let others = others.into_iter().filter(|other| is_new(other, beside.terms)).collect();
         self.take(others, columns, beside.around, true);
@@ -220,7 +220,7 @@ impl PlaceGroups {
             self.groups.swap(g, other);
         }
         self.groups.truncate(first);
-        best.map_or(log, |(_, better)| better)
+        best.map(|(_, better)| better)
     }
 
     /// The price of a group's choice: all motions and variables alike, and within a motion that steps all times.

@@ -122,7 +122,8 @@ impl KnotSearch<'_, '_, '_, '_> {
         }
         let mut knots: Vec<f64> = chosen[fixed..].iter().map(|k| all[*k]).collect();
         knots.sort_by(f64::total_cmp);
-        (!knots.is_empty()).then_some(knots)
+        // What takes all knots that there are is a rough curve.
+        (!knots.is_empty() && knots.len() < most).then_some(knots)
     }
 
     /// Products of the columns of one knot each, beside the state.
