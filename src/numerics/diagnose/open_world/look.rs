@@ -118,9 +118,10 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// A law of the list or the free form of a place beside everything.
     pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
         let price = (self.beside.logs.len().max(1) as f64).ln();
-        let strong = self.beside.best.iter().filter(|form| form.log - price > *STRONG && !refused.contains(&form.place));
+        let strong = || self.beside.best.iter().filter(|form| form.log - price > *STRONG && !refused.contains(&form.place));
         let first = |form: &FreeForm| form.terms.first().map_or(f64::NEG_INFINITY, |term| term.log);
-        let form = strong.max_by(|a, b| first(a).total_cmp(&first(b)))?;
+        let form = strong().max_by(|a, b| first(a).total_cmp(&first(b)))?;
+        let whole = strong().max_by(|a, b| a.log.total_cmp(&b.log))?;
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let laws = case.listed(&[], &self.whole);
@@ -130,9 +131,15 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             let sentence = format!("{} at {} joins: it says more than a free form", law.key.0, law.key.1);
             self.change(&[], 0.0).law(hypothesis, sentence)
         });
-        let free = || {
+        let joined = |form: &FreeForm, terms: &[FreeTerm]| {
             let sentence = format!("a free form at {} joins: {:.0} nats of evidence", form.place, form.log);
-            self.change(&[], 0.0).free(self.own_terms(form), sentence)
+            self.change(&[], 0.0).free(terms, sentence)
+        };
+        // What each place says alone tells where it is; all that one of them says may still be the better model.
+        let free = || {
+            let (own, all) = (joined(form, self.own_terms(form)), joined(whole, &whole.terms));
+            let better = all.as_ref().zip(own.as_ref()).is_none_or(|(all, own)| all.folds.is_better_than(&own.folds));
+            if better { all.or(own) } else { own.or(all) }
         };
         let step = named.or_else(free);
         if step.is_none() {

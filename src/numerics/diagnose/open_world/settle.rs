@@ -53,7 +53,7 @@ pub(crate) fn settle(
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
             }
         }
-        let Some(ModelStep { state, kept, new, sentence }) = step else { return Settled { judged, odds } };
+        let Some(ModelStep { state, kept, new, sentence, .. }) = step else { return Settled { judged, odds } };
         tell(sentence);
         let mut set: Vec<usize> = kept.iter().map(|i| judged.set[*i]).collect();
         let first = pool.add(new);

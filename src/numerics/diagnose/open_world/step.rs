@@ -13,6 +13,8 @@ pub(super) struct ModelStep {
     /// Causes that stay, by their positions.
     pub kept: Vec<usize>,
     pub new: Vec<Hypothesis>,
+    /// Of poses that a fit did not see.
+    pub folds: FoldErrors,
     /// What was done.
     pub sentence: String,
 }
@@ -117,6 +119,7 @@ impl ModelChange<'_, '_> {
         let causes: Vec<EstimatedCause> = kept.iter().map(|i| judged.state.causes[*i].clone()).chain(causes).collect();
         let state = fitter.fit(&judged.state.model, causes);
         let (before, after) = (FoldErrors::of(&judged.state, fitter)?, FoldErrors::of(&state, fitter)?);
-        (after.gain_over(&before) > -self.worse * before.rms()).then_some(ModelStep { state, kept, new, sentence })
+        let holds = after.gain_over(&before) > -self.worse * before.rms();
+        holds.then_some(ModelStep { state, kept, new, folds: after, sentence })
     }
 }
