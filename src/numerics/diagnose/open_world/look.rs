@@ -138,9 +138,9 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         // What each place says alone tells where it is; all that one of them says may still be the better model.
         let free = || {
             let terms = self.own_terms(form);
-            let own = joined(form, terms);
             let is_more = whole.place != form.place || whole.terms.len() > terms.len();
-            let all = is_more.then(|| joined(whole, &whole.terms)).flatten();
+            let all = || is_more.then(|| joined(whole, &whole.terms)).flatten();
+            let (own, all) = rayon::join(|| joined(form, terms), all);
             let is_better = all.as_ref().is_some_and(|all| own.as_ref().is_none_or(|own| all.folds.is_better_than(&own.folds)));
             if is_better { all } else { own }
         };
