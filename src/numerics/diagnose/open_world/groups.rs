@@ -310,8 +310,13 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
         Place::Joint(joint) => {
-            let own: Vec<_> =
-                angles(joint).chain(passing()).chain(sides()).chain(loads([joint; 2])).chain(moved(joint)).chain(space()).collect();
+            let own: Vec<_> = angles(joint)
+                .chain(passing())
+                .chain(sides())
+                .chain(loads([joint; 2]))
+                .chain(moved(joint))
+                .chain(space())
+                .collect();
             let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { *FINEST } else { *count }));
             let mut out = vec![(Motion::Joint { joint }, finest.collect())];
             if survey.robot.is_revolute(joint) {
