@@ -12,6 +12,8 @@ criteria! {
     BULK: f64 = 0.98, "quantile", "judgement: one row in fifty may be wrong", "";
     /// ... and far outside begins this many times farther out: with normal noise at 9.4 standard deviations.
     FAR: f64 = 3.0, "ratio", "count: with normal noise 9.4 standard deviations", "changes nothing on 2";
+    /// Rows that are wrong in any recording; beyond these, the share above the bulk.
+    MISTAKES: usize = 3, "rows", "judgement: single slips happen in any recording", "";
     /// With more than this share of unexplained rows, beyond what chance adds, the model is wrong and not the rows.
     CROWD: f64 = 0.125, "share", "judgement: an eighth", "changes nothing on 2";
     /// Among a crowd, only rows this many times the limit away are mistakes all the same.

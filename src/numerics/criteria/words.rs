@@ -16,8 +16,6 @@ criteria! {
     /// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little
     /// it is confirmed.
     REJECTED: f64 = 0.8, "probability", "judgement: four to one", "";
-    /// The least probability that none of the list is right where held-out rows are worse with the findings than without.
-    CONTRADICTED: f64 = 0.6, "probability", "judgement: no name is more probable than not", "";
     /// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went
     /// astray.
     ASTRAY: f64 = 2.0, "ratio", "judgement: folds of five scatter by less", "";

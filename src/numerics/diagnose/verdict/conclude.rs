@@ -20,7 +20,7 @@ use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
-pub(crate) fn conclude(mut last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
+pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
     let (data, state) = (&fitter.data, &last.judged.state);
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
@@ -30,14 +30,10 @@ pub(crate) fn conclude(mut last: LastRound, fitter: &Fitter, before: &[Option<f6
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
     let structured = last.last <= *SIGNIFICANT || lacking;
-    let something_left = structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE
-        || misfit.chi_square > *MAX_CHI_SQUARE
-        || misfit.not_carried.is_some();
-    let [before, after] = [before, &misfit.sizes].map(|sizes| ErrorLengths::of(sizes, &misfit.figures));
-    if misfit.not_carried.is_some() && before.zip(after).is_some_and(|(before, after)| after.rms > before.rms) {
-        last.contradict();
-    }
-    let (rest, findings) = without_small_rests(findings(&last, something_left));
+    let left_at_fitted_rows =
+        structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE;
+    let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
+    let (rest, findings) = without_small_rests(findings(&last, left_at_fitted_rows));
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
@@ -68,8 +64,8 @@ pub(crate) fn conclude(mut last: LastRound, fitter: &Fitter, before: &[Option<f6
         noise_basis: basis,
         verdict,
         noise_floor: misfit.noise(basis),
-        before,
-        after,
+        before: ErrorLengths::of(before, &misfit.figures),
+        after: ErrorLengths::of(&misfit.sizes, &misfit.figures),
         held_out: misfit.held_out,
         folds,
         next_measurements: next(&findings, fitter.question.own),

@@ -1,6 +1,7 @@
 //! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
 use super::last_round::LastRound;
+use crate::criteria::screen::{BULK, MISTAKES};
 use crate::diagnose::types::{Finding, Probabilities};
 use crate::effect::{Place, names};
 use crate::error::counted;
@@ -16,15 +17,17 @@ pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
 }
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell. Where physics is
-/// left, a row that only the model speaks against may be where that shows most.
+/// left, or too many rows stand out, one that only the model speaks against may be where physics shows most.
 pub(super) fn faults(last: &LastRound, unknown: Option<usize>, something_left: bool) -> Vec<Finding> {
     let screening = &last.judged.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
-    let far =
-        |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach && (s.corroborated || !something_left);
+    let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
+    let alone = |s: &&Suspect| s.kind == SuspectKind::Outlier && !s.used() && !s.corroborated;
+    let many = screening.suspects.iter().filter(alone).count().saturating_sub(*MISTAKES) as f64;
+    let doubted = something_left || many > (1.0 - *BULK) * last.survey.data.rows() as f64;
     let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
         let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
-        own.filter(|s| far(s)).map(|s| s.row + 1).collect()
+        own.filter(|s| far(s) && !(doubted && alone(s))).map(|s| s.row + 1).collect()
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();

@@ -1,6 +1,5 @@
 //! What the last round looked at, and what stands of what it found.
 
-use crate::criteria::words::CONTRADICTED;
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::open_world::NameOdds;
@@ -39,11 +38,6 @@ impl LastRound<'_, '_> {
     /// Whether a name is not to be given.
     pub fn excludes(&self, effect: &str) -> bool {
         self.without.iter().any(|name| name == effect)
-    }
-
-    /// Takes from the names what held-out rows say against them, which the model is worse at than the one without: one of its causes is none.
-    pub fn contradict(&mut self) {
-        self.odds.values_mut().for_each(|odds| odds.none = odds.none.max(*CONTRADICTED));
     }
 
     /// What the best hypothesis beside the chosen ones would be.
