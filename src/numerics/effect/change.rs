@@ -79,7 +79,7 @@ joints: [{name: A1}, {name: A2}]
         let form = Form::from(Term::new(&Unknown, joint, Law::of(Variable::Payload)));
         let middle = |hypothesis: &Hypothesis| {
             let basis = hypothesis.form.term().map(Term::basis);
-            matches!(basis, Some(Basis::After { at }) if (at - 295.0).abs() < 10.0)
+            matches!(basis, Some(Basis::After { at }) if (at - 295.0).abs() <= 10.0)
         };
         (moved_with_the_payload(&form, &survey), propose(&Unknown, &[joint], &survey).iter().any(middle))
     }
