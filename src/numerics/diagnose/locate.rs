@@ -31,9 +31,17 @@ pub(crate) fn locate(pool: &HypothesisSet, given: &Conditional, survey: &Survey)
     }
     let mut shares: Vec<ExplainedShare> = best.into_values().collect();
     shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
-    spectrum.sort_by_key(|wave| (wave.joint, wave.motor, wave.order));
+    let spectrum = strongest(spectrum);
     debug_assert!(spectrum.iter().all(|wave| wave.joint < survey.joints()));
     Located { shares, spectrum }
+}
+
+/// Lines by joint, gear side and order; of several causes that are one line the one that explains most.
+fn strongest(mut lines: Vec<SpectrumLine>) -> Vec<SpectrumLine> {
+    let key = |line: &SpectrumLine| (line.joint, line.motor, line.order);
+    lines.sort_by(|a, b| key(a).cmp(&key(b)).then(b.share.total_cmp(&a.share)));
+    lines.dedup_by_key(|line| key(line));
+    lines
 }
 
 /// What a form depends on, in words.
@@ -49,4 +57,17 @@ fn wave(form: &Form) -> Option<(usize, bool, u32)> {
     let Basis::Wave { order, overtone: false } = term.basis() else { return None };
     let motor = of == Variable::Motor { joint };
     (motor || of == Variable::Angle { joint }).then_some((joint, motor, order))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_causes_of_one_order_are_one_line() {
+        let line = |joint, order, share| SpectrumLine { joint, motor: true, order, share };
+        let all = strongest(vec![line(1, 2, 0.1), line(0, 1, 0.2), line(0, 1, 0.5), line(0, 3, 0.1)]);
+        let seen: Vec<(usize, f64)> = all.iter().map(|line| (line.joint, line.share)).collect();
+        assert_eq!(seen, [(0, 0.5), (0, 0.1), (1, 0.1)]);
+    }
 }
