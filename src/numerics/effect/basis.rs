@@ -146,6 +146,11 @@ impl Knots {
     pub fn all(&self) -> &[f64] {
         &self.at[..self.count]
     }
+
+    /// Without the first and the last.
+    pub fn inner(&self) -> &[f64] {
+        self.all().get(1..self.count.saturating_sub(1)).unwrap_or_default()
+    }
 }
 
 impl TryFrom<Vec<f64>> for Knots {
@@ -310,6 +315,12 @@ pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]:
 mod tests {
     use super::*;
 
+    fn values(basis: Basis, u: f64) -> Vec<f64> {
+        let mut out = vec![0.0; basis.count()];
+        basis.at(u, &mut |k, value| out[k] = value);
+        out
+    }
+
     #[test]
     fn cosines_of_high_orders_are_those_of_the_library() {
         for (u, order) in [(0.3, 1), (1.7, 40), (2.9, 180), (3.0, 200)] {
@@ -320,16 +331,13 @@ mod tests {
 
     #[test]
     fn steps_and_corners_are_what_their_knots_say_and_stay_so_in_json() {
-        let values = |basis: Basis, u: f64| {
-            let mut out = vec![0.0; basis.count()];
-            basis.at(u, &mut |k, value| out[k] = value);
-            out
-        };
         let steps = Basis::Steps { knots: Knots::new([0.5, -0.5]) };
         assert_eq!([-1.0, 0.0, 0.6].map(|u| values(steps, u)), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let corners = Basis::Corners { knots: Knots::new([-1.0, 0.0, 1.0]) };
         let hats = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.75, 0.25], [0.0, 0.0, 1.0]];
         assert_eq!([-3.0, -0.5, 0.25, 7.0].map(|u| values(corners, u)), hats);
+        let inner = |knots: &[f64]| Knots::new(knots.iter().copied()).inner().to_vec();
+        assert_eq!([inner(&[1.0]), inner(&[1.0, 2.0]), inner(&[3.0, 1.0, 2.0])], [vec![], vec![], vec![2.0]]);
         for basis in [steps, corners] {
             let text = serde_json::to_string(&basis).expect("JSON");
             assert_eq!(serde_json::from_str::<Basis>(&text).expect("the same"), basis, "{text}");
@@ -340,11 +348,6 @@ mod tests {
 
     #[test]
     fn a_curve_is_straight_across_a_gap_and_as_before_beside_it() {
-        let values = |basis: Basis, u: f64| {
-            let mut out = vec![0.0; basis.count()];
-            basis.at(u, &mut |k, value| out[k] = value);
-            out
-        };
         let (low, high, count) = (-1.0, 2.0, 12);
         let plain = Basis::Fading { low, high, count, gaps: Gaps::default() };
         let bridged = Basis::Fading { low, high, count, gaps: Gaps([[0.25, 0.75], [0.0; 2]]) };

@@ -45,25 +45,14 @@ fn is_its_own(term: &Term, survey: &Survey) -> bool {
 mod tests {
     use super::*;
     use crate::effect::Unknown;
-    use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Measurements, PointReadings, RobotModel};
+    use crate::robot::{Measurements, PointReadings, small_arm};
     use nalgebra::Vector3;
 
-    const ROBOT: &str = "calib_robot: 1
-name: small
-units: {length: mm, angle: deg}
-kinematics:
-  screws:
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, 1, 0], point: [0, 0, 400]}
-tool: {point: [500, 0, 400]}
-joints: [{name: A1}, {name: A2}]
-";
     const ROWS: usize = 60;
 
     /// What may have moved with the payload of a joint that follows it, and whether a zero that moves in the middle is proposed.
     fn told(payload: impl Fn(usize) -> f64) -> (Option<(&'static str, Place)>, bool) {
-        let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+        let robot = small_arm();
         let data = Measurements {
             joints: 2,
             q: (0..2 * ROWS).map(|k| (k as f64 * 0.7).sin()).collect(),

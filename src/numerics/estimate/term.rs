@@ -71,21 +71,10 @@ mod tests {
     use crate::effect::{EffectContext, EffectStack, Load, arm_effect};
     use crate::estimate::Model;
     use crate::observation::{Dimension, KindDescription, Rank, Weight};
-    use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Readings, RobotModel};
+    use crate::robot::{Readings, small_arm};
     use crate::spatial::Pose;
     use nalgebra::Vector3;
 
-    const ROBOT: &str = "calib_robot: 1
-name: small
-units: {length: mm, angle: deg}
-kinematics:
-  screws:
-    - {axis: [0, 0, 1], point: [0, 0, 0]}
-    - {axis: [0, 1, 0], point: [0, 0, 400]}
-tool: {point: [500, 0, 400]}
-joints: [{name: A1}, {name: A2}]
-";
     const SIGMA: f64 = 1e-5;
 
     /// How far a point lies along five lines.
@@ -122,7 +111,7 @@ joints: [{name: A1}, {name: A2}]
 
     #[test]
     fn a_kind_of_more_than_three_numbers_has_a_residual_as_wide_and_its_own_partials() {
-        let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+        let robot = small_arm();
         let base = Pose::identity();
         let effects = vec![arm_effect("joint_offset", &EffectContext { base, load: Load::GravityTorque }).expect("a cause")];
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));

@@ -40,3 +40,28 @@ pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 pub use travel::Travel;
 pub(crate) use visited::numbered;
 pub use visited::{Unmeasured, Visited};
+
+#[cfg(test)]
+pub(crate) use tests::small_arm;
+
+#[cfg(test)]
+mod tests {
+    use super::RobotModel;
+    use super::import::{RobotFileText, read_calib};
+
+    const FILE: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+tool: {point: [500, 0, 400]}
+joints: [{name: A1}, {name: A2}]
+";
+
+    /// The arm: about the vertical, then about a level axis 400 mm up; the point 500 mm out.
+    pub(crate) fn small_arm() -> RobotModel {
+        RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: FILE }, None).expect("a robot").robot)
+    }
+}

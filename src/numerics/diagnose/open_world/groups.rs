@@ -238,7 +238,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         out
     }
 
-    /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
+    /// Products of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
     pub fn products(&mut self, group: &FreeGroup) -> Vec<FreeGroup> {
         if group.law.times.is_some() || matches!(group.law.first.basis, Basis::After { .. }) {
             return Vec::new();

@@ -1,5 +1,6 @@
 //! The verdict: findings with their evidence, before and after on held-out rows, and what is left.
 
+use super::faults::stand_out_in_number;
 use super::findings::findings;
 use super::last_round::LastRound;
 use super::not_observable::{next, not_observable, not_tried};
@@ -30,8 +31,9 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
     let structured = last.last <= *SIGNIFICANT || lacking;
+    let many_aside = stand_out_in_number(&state.screening, data.rows());
     let left_at_fitted_rows =
-        structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE;
+        structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE || many_aside;
     let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
     let (rest, findings) = without_small_rests(findings(&last, left_at_fitted_rows));
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
@@ -45,7 +47,17 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     };
     let nameless = !something_left && only_unknown(&findings);
     let partly_nameless = !something_left && !nameless && nameless_share(&findings) > *NAMELESS;
-    let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
+    let remarks = [
+        many_aside.then_some(
+            "more rows stand out than mistakes would, and nothing but the model speaks against them: what is missing may show \
+             most there",
+        ),
+        misfit.not_carried.map(|_| {
+            "held-out points are off by more than the fitted ones and the noise allow: something differs there \
+             (another time, another region) that the fitted points do not show"
+        }),
+    ];
+    let signature = signature(&rest, &last, something_left, remarks);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(unseen(&last));
@@ -150,17 +162,13 @@ fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatab
     }
 }
 
-/// What is left looks like, where it is not noise.
-fn signature(rest: &[Finding], last: &LastRound, something_left: bool, not_carried: bool) -> Option<String> {
+/// What is left looks like, where it is not noise, and what else speaks for it.
+fn signature(rest: &[Finding], last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
     let statements: Vec<&str> = rest.iter().map(|finding| finding.statement.as_str()).collect();
     let mut signature = (!rest.is_empty()).then(|| statements.join(" "));
     if something_left && signature.is_none() {
         signature = last.best();
     }
-    if not_carried {
-        let text = "held-out points are off by more than the fitted ones and the noise allow: something differs there \
-                    (another time, another region) that the fitted points do not show";
-        signature = Some(signature.map_or(text.into(), |signature| format!("{signature}; {text}")));
-    }
-    signature
+    let parts: Vec<&str> = signature.as_deref().into_iter().chain(remarks.into_iter().flatten()).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }

@@ -5,7 +5,7 @@ use crate::criteria::screen::{BULK, MISTAKES};
 use crate::diagnose::types::{Finding, Probabilities};
 use crate::effect::{Place, names};
 use crate::error::counted;
-use crate::estimate::{Suspect, SuspectKind};
+use crate::estimate::{Screening, Suspect, SuspectKind};
 
 /// Joints and points of all rows that are so many rows apart.
 pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
@@ -16,18 +16,27 @@ pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
     of_the_recording(names::JOINT_LOG_LAG, text, last)
 }
 
+/// Whether more rows are set aside by the model alone than mistakes are: missing physics may show most there.
+pub(super) fn stand_out_in_number(screening: &Screening, rows: usize) -> bool {
+    let far = |s: &&Suspect| is_by_the_model_alone(s) && s.statistic > screening.reach;
+    let many = screening.suspects.iter().filter(far).count().saturating_sub(*MISTAKES);
+    many as f64 > (1.0 - *BULK) * rows as f64
+}
+
+/// Whether nothing but the model speaks against a row that is set aside.
+fn is_by_the_model_alone(suspect: &Suspect) -> bool {
+    suspect.kind == SuspectKind::Outlier && !suspect.corroborated
+}
+
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell. Where physics is
-/// left, or too many rows stand out, one that only the model speaks against may be where physics shows most.
+/// left, a row that only the model speaks against may be where that shows most.
 pub(super) fn faults(last: &LastRound, unknown: Option<usize>, something_left: bool) -> Vec<Finding> {
     let screening = &last.judged.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
     let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
-    let alone = |s: &&Suspect| s.kind == SuspectKind::Outlier && !s.used() && !s.corroborated;
-    let many = screening.suspects.iter().filter(alone).count().saturating_sub(*MISTAKES) as f64;
-    let doubted = something_left || many > (1.0 - *BULK) * last.survey.data.rows() as f64;
     let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
         let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
-        own.filter(|s| far(s) && !(doubted && alone(s))).map(|s| s.row + 1).collect()
+        own.filter(|s| far(s) && !(something_left && is_by_the_model_alone(s))).map(|s| s.row + 1).collect()
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
@@ -69,5 +78,24 @@ fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -
         probabilities: Probabilities::default(),
         valid: None,
         forms: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_more_than_mistakes_beyond_three_and_one_in_fifty_if_only_the_model_speaks_against_them() {
+        let suspect = |row, corroborated, statistic| {
+            let kind = SuspectKind::Outlier;
+            Suspect { row, kind, partner: None, size: 1e-3, statistic, corroborated }
+        };
+        let many = |count: usize, corroborated, statistic, rows| {
+            let suspects = (0..count).map(|row| suspect(row, corroborated, statistic)).collect();
+            stand_out_in_number(&Screening { suspects, reach: 10.0, ..Screening::default() }, rows)
+        };
+        assert!(many(8, false, 20.0, 100) && !many(3, false, 20.0, 50) && !many(8, false, 20.0, 1000));
+        assert!(!many(8, true, 20.0, 100) && !many(8, false, 5.0, 100));
     }
 }

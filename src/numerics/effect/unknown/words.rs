@@ -62,7 +62,7 @@ pub(super) fn in_words(term: &Term, slides: bool, clock: Clock) -> String {
 fn knots_in_words(term: &Term, slides: bool) -> String {
     let knots = term.law().factors().find_map(|factor| match factor.basis {
         Basis::Steps { knots } => Some(("steps", knots.all().to_vec(), factor.of)),
-        Basis::Corners { knots } => Some(("turns", knots.all()[1..knots.all().len() - 1].to_vec(), factor.of)),
+        Basis::Corners { knots } => Some(("turns", knots.inner().to_vec(), factor.of)),
         _ => None,
     });
     let Some((does, knots, of)) = knots else { return String::new() };
