@@ -66,6 +66,28 @@ impl Site<'_> {
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
     }
 
+    /// What a foreign effect does at the points after the first `fit` ones beyond what it does there when it holds the edge values of the
+    /// times and temperatures of these: root mean square of a coordinate, m.
+    pub fn beyond(&self, fit: usize, effects: &[Physical]) -> f64 {
+        let fitted = &self.points[..fit.min(self.points.len())];
+        let range = |of: fn(&Point) -> f64| {
+            let values = fitted.iter().map(of);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+        };
+        let (times, temperatures) = (range(|point| point.time_s), range(|point| point.temperature_c));
+        let held = |effect: &Physical| match effect {
+            Physical::Foreign(foreign) => Physical::Foreign(foreign.held(times, temperatures)),
+            other => other.clone(),
+        };
+        let held: Vec<Physical> = effects.iter().map(held).collect();
+        if held == effects {
+            return 0.0;
+        }
+        let [all, held] = [effects, &held].map(|effects| self.displacement(effects));
+        let judged: Vec<f64> = all.iter().zip(&held).skip(3 * fitted.len()).map(|(all, held)| all - held).collect();
+        norm(&judged) / (judged.len().max(1) as f64).sqrt()
+    }
+
     /// Central differences by every number of geometry, gears, couplings and the tracker's pose.
     fn geometry(&self) -> Vec<Column> {
         let mut out = Vec::new();

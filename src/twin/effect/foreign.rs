@@ -74,11 +74,34 @@ pub struct ForeignCourse {
     pub shape: ForeignShape,
 }
 
+impl ForeignCourse {
+    /// The same with the edge value of a range beyond it.
+    fn held(&self, seen: [f64; 2]) -> Self {
+        let [from, to] = self.between;
+        let between = [seen[0].max(from), seen[1].min(to)];
+        if between[1] - between[0] <= 1e-9 * (to - from) {
+            return self.clone();
+        }
+        let shape = self.shape.part(between.map(|value| (value - from) / (to - from)));
+        Self { over: self.over.clone(), between, shape }
+    }
+}
+
 fn first() -> usize {
     1
 }
 
 impl Foreign {
+    /// The same as far as a range of times (s) and of temperatures (C) shows it: beyond them it holds its edge value.
+    pub fn held(&self, time_s: [f64; 2], temperature_c: [f64; 2]) -> Self {
+        let held = |course: &ForeignCourse| match course.over {
+            ForeignVariable::Time => course.held(time_s),
+            ForeignVariable::Temperature => course.held(temperature_c),
+            _ => course.clone(),
+        };
+        Self { courses: self.courses.iter().map(held).collect(), ..self.clone() }
+    }
+
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
         self.courses

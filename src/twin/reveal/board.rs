@@ -1,7 +1,7 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
 use super::left_out::LeftOut;
-use super::mark::{Case, DUE, Marked, Outcome};
+use super::mark::{Case, DUE, HeldOut, Marked, Outcome};
 use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
@@ -192,6 +192,13 @@ impl Board {
     pub fn worse(&self) -> Share {
         let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
         Share::of(due.filter_map(|case| case.held_out.map(|held_out| held_out.after > held_out.before)))
+    }
+
+    /// Of these, those whose held-out error is above its bound, too.
+    pub fn worse_than_bound(&self) -> Share {
+        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
+        let is_worse = |held_out: HeldOut| held_out.after > held_out.before.max(held_out.bound);
+        Share::of(due.filter_map(|case| case.held_out.map(is_worse)))
     }
 
     /// Explained shares of held-out errors where an effect is due, ascending.

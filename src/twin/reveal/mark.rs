@@ -64,7 +64,8 @@ pub struct HeldOut {
     pub before: f64,
     /// With the findings.
     pub after: f64,
-    /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit.
+    /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit; with it what shapes
+    /// do beyond the times and temperatures of the points to fit, which no model of these can know.
     pub bound: f64,
 }
 
@@ -201,6 +202,8 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let after = answer.after.as_ref()?.validate_rms_mm?;
     let found: usize = answer.findings.iter().map(|finding| finding.parameters.len()).sum();
     let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
-    let floor = 3f64.sqrt() * truth.noise.as_ref()?.validate_rms_per_axis_mm;
-    Some(HeldOut { before, after, bound: floor * (1.0 + p / (n - p - 1.0).max(1.0)).sqrt() })
+    let noise = truth.noise.as_ref()?;
+    let square = noise.validate_rms_per_axis_mm.powi(2) * (1.0 + p / (n - p - 1.0).max(1.0));
+    let bound = (3.0 * (square + noise.beyond_fitted_rms_per_axis_mm.powi(2))).sqrt();
+    Some(HeldOut { before, after, bound })
 }

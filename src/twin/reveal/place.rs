@@ -1,5 +1,6 @@
 //! Whether a diagnosis looked in the right place, gave no wrong name, and said `unknown` where it knew no name.
 
+use super::left_out::GIVEN;
 use super::paper::{Atoms, Cause, Finding, Truth, atoms};
 use super::share::Share;
 use std::collections::BTreeSet;
@@ -19,6 +20,8 @@ pub struct Placed {
     /// A name was given that is not there: by a finding that is neither wanted nor accepted nor has such a rival, or as the first choice
     /// at the right place.
     pub wrong_name: bool,
+    /// The same with a probability of [`GIVEN`] or more.
+    pub wrong_given: bool,
 }
 
 fn places(names: &Atoms) -> BTreeSet<&str> {
@@ -52,6 +55,7 @@ pub(super) fn placed(
             || !accepted.is_disjoint(&found)
             || said.iter().any(|(finding, names)| finding.effect == NAMELESS && there(names)),
         wrong_name: said.iter().any(|(finding, names)| wrong(finding, names)),
+        wrong_given: said.iter().any(|(finding, names)| wrong(finding, names) && finding.probability.unwrap_or(1.0) >= GIVEN),
     }
 }
 
@@ -64,6 +68,8 @@ pub struct Places {
     pub name_or_unknown: Share,
     /// Wrong names.
     pub wrong_name: Share,
+    /// Wrong names with a probability of [`GIVEN`] or more.
+    pub wrong_given: Share,
 }
 
 impl Places {
@@ -74,6 +80,7 @@ impl Places {
             place: share(|one| one.place),
             name_or_unknown: share(|one| one.name_or_unknown),
             wrong_name: share(|one| one.wrong_name),
+            wrong_given: share(|one| one.wrong_given),
         }
     }
 }

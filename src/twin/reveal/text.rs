@@ -125,6 +125,7 @@ impl Board {
         if near.of > 0 {
             let _ = writeln!(out, "held-out rms within {NEAR_BOUND} of its bound: {}", percent(&near));
             let _ = writeln!(out, "held-out rms larger than before: {}", percent(&self.worse()));
+            let _ = writeln!(out, "held-out rms larger than before and than its bound: {}", percent(&self.worse_than_bound()));
         }
     }
 
@@ -184,7 +185,7 @@ impl Board {
             json!({ "which": title, "shares": shares.iter().map(|(what, of)| json!({ "what": what, "share": share(of) })).collect::<Vec<_>>() })
         });
         let places = |of: &Places| {
-            let each = [("place", of.place), ("name_or_unknown", of.name_or_unknown), ("wrong_name", of.wrong_name)];
+            let each = [("place", of.place), ("name_or_unknown", of.name_or_unknown), ("wrong_name", of.wrong_name), ("wrong_name_0.5", of.wrong_given)];
             each.iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>()
         };
         let (placed, placed_by_effect) = self.places();
@@ -204,7 +205,7 @@ impl Board {
             "reliability": reliability,
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
             "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
-            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()), "due_worse": share(&self.worse()) },
+            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()), "due_worse": share(&self.worse()), "due_worse_than_bound": share(&self.worse_than_bound()) },
             "left_out": { "recordings": self.left_out.len(), "worlds": left_out, "reliability": reliable("names where the data cannot tell", self.untold_reliability()) },
             "explained_share": spread(&self.explained()),
             "failures": self.failures().map(failure).collect::<Vec<_>>(),
@@ -224,11 +225,12 @@ fn tell_reliability(out: &mut String, of: &str, Reliability { bins, brier, auc }
     }
 }
 
-fn titled(all: &Places) -> [(&'static str, Share); 3] {
+fn titled(all: &Places) -> [(&'static str, Share); 4] {
     [
         ("place right", all.place),
         ("name right, or unknown at the right place", all.name_or_unknown),
-        ("a wrong name given", all.wrong_name),
+        ("a wrong name at all", all.wrong_name),
+        ("a wrong name with 0.5 or more", all.wrong_given),
     ]
 }
 

@@ -50,10 +50,25 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let size = draw.sign() * draw.size(40.0, 200.0);
     let columns: Vec<Column> = courses.iter().filter_map(|course| column(&course.over)).collect();
     let form = form(&courses);
+    // Time only goes on, and so does the temperature of these recordings: what jumps with them does so once and for good.
+    let passes = |course: &ForeignCourse| matches!(course.over, ForeignVariable::Time | ForeignVariable::Temperature);
+    let steps = matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
     let effect = Physical::Foreign(Foreign { motion, seat, direction, size, courses });
     let (place, same) = places(bench, motion, seat);
+    let all: Vec<String> = std::iter::once(place.clone()).chain(same.clone()).collect();
     let draft = Draft::new(form, vec![sized("unknown", place, vec![effect])]).needing(&columns);
-    same.into_iter().fold(draft, |draft, place| draft.accepting("unknown", place))
+    let draft = same.into_iter().fold(draft, |draft, place| draft.accepting("unknown", place));
+    let steps = steps.then(|| all.into_iter().filter_map(|place| Some((step(motion, &place)?, place))));
+    steps.into_iter().flatten().fold(draft, |draft, (name, place)| draft.accepting(name, place))
+}
+
+/// The name of what moves at a place so, once and for good, if there is one.
+fn step(motion: ForeignMotion, place: &str) -> Option<&'static str> {
+    match place {
+        "base" => Some("base_shift"),
+        "tool" => Some("tool_shift"),
+        _ => (motion == ForeignMotion::JointTurn).then_some("zero_shift"),
+    }
 }
 
 /// The joint or link that moves: not the last joint's turn, which hardly moves the tool, and links with a length.
