@@ -34,7 +34,7 @@ pub struct Progress {
     verbosity: Verbosity,
     /// Width of the stages' ids.
     width: usize,
-    /// Of the terminal, if it is one.
+    /// Width of the terminal, if it is one.
     columns: Option<usize>,
     state: Mutex<State>,
 }

@@ -34,7 +34,7 @@ pub fn diagnosis(store: &Store, run: &str, step: Option<&str>, uses: &[&str]) ->
     Ok((manifest, stage))
 }
 
-/// Of stages and their ids the one that is meant; nothing where there are none.
+/// The stage that is meant among several with their ids; nothing where there are none.
 pub fn the_stage<'a, T: Copy>(place: &str, own: &[(T, &'a str)], step: Option<&str>) -> Result<Option<(T, &'a str)>> {
     let list = || own.iter().map(|(_, id)| *id).collect::<Vec<_>>().join(", ");
     match (own, step) {

@@ -9,7 +9,7 @@ use crate::store::{ActionRecord, Store, TableHash};
 /// A table with the action that made it.
 #[derive(Debug, Clone, Serialize)]
 pub struct LineageNode {
-    /// Of its content.
+    /// Hash of its content.
     pub table_hash: TableHash,
     /// Nothing where the store has no record of who made it.
     pub made: Option<Provenance>,
@@ -22,7 +22,7 @@ pub struct Provenance {
     pub stage: String,
     /// Its kind.
     pub uses: String,
-    /// Of its algorithm.
+    /// Version of its algorithm.
     pub implementation: u32,
     /// On which it was written.
     pub port: String,
@@ -38,7 +38,7 @@ pub struct Provenance {
     pub when: String,
     /// With defaults filled in.
     pub settings: serde_json::Value,
-    /// Of the stage.
+    /// The seed of the stage.
     pub seed: u64,
     /// Raw files: name and blake3.
     pub files: Vec<(String, String)>,
@@ -53,7 +53,7 @@ pub fn lineage(store: &Store, start: &str) -> Result<LineageNode> {
     let mut makers: BTreeMap<TableHash, (ActionRecord, String)> = BTreeMap::new();
     for record in store.records()? {
         for (port, table) in &record.tables {
-            // Of several actions that gave the same table, the first in the order of their ids.
+            // A table that several actions gave is traced to the first of them in the order of their ids.
             makers.entry(table.table_hash.clone()).or_insert_with(|| (record.clone(), port.clone()));
         }
     }

@@ -31,7 +31,7 @@ pub struct RunSummary {
     pub pipeline: String,
     /// RFC 3339, UTC.
     pub started: String,
-    /// Of calib.
+    /// The version of calib.
     pub version: String,
 }
 

@@ -42,7 +42,7 @@ pub struct QueryColumn {
     /// As the schema states it.
     #[serde(rename = "type")]
     pub column_type: String,
-    /// Of numbers.
+    /// Unit of its numbers, where the schema states one.
     pub unit: Option<String>,
     /// What it means.
     pub description: String,

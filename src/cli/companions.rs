@@ -15,7 +15,7 @@ const ABOVE: usize = 4;
 pub(super) struct Companions(Vec<(String, Vec<u8>)>);
 
 impl Companions {
-    /// Of a program: files of its name and other endings of its language, the system's data, and those that are named.
+    /// The files beside a program: those of its name with other endings of its language, the system's data, and those that are named.
     pub fn of(program: &Path, language: Language, named: &[PathBuf]) -> Result<Self> {
         let mut paths = if language == Language::Krl { found(program) } else { Vec::new() };
         paths.extend(named.iter().filter(|path| !paths.contains(path)).cloned().collect::<Vec<_>>());

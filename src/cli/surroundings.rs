@@ -36,7 +36,7 @@ pub(super) fn now() -> SystemTime {
     SystemTime::now()
 }
 
-/// Of this process so far, bytes; the kernel tells it on Linux alone.
+/// The most memory that this process had in use so far, bytes; the kernel tells it on Linux alone.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

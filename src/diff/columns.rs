@@ -15,7 +15,7 @@ pub(super) struct ColumnPair {
     pub a: Vec<usize>,
     pub b: Vec<usize>,
     pub how: Comparator,
-    /// Of the difference; empty where there is none, `row` where every row has its own.
+    /// Unit of the difference; empty where there is none, `row` where every row has its own.
     pub unit: String,
     /// B's values are multiplied by the first and added to the second, so that they are in A's unit.
     pub conversion: (f64, f64),

@@ -18,7 +18,7 @@ pub(super) const CHANGED: u8 = 2;
 /// A pair of cells that are not the same.
 #[derive(Debug, Clone)]
 pub(super) struct CellDifference {
-    /// Of A.
+    /// The row of A.
     pub row: u32,
     pub changed: bool,
     pub a: CellValue,
@@ -109,7 +109,7 @@ struct Theirs {
 
 /// A row of A and its partner.
 struct Pair<'p> {
-    /// Of A: the columns, and their numbers, with the column of sigmas last where there is one.
+    /// The columns of A, and their numbers, with the column of sigmas last where there is one.
     batch: &'p [ArrayRef],
     ours: &'p [Vec<f64>],
     /// B's numbers, in the order of A.

@@ -53,9 +53,9 @@ pub struct DiffOptions {
 /// A tolerance for all columns, and for some.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tolerances {
-    /// Of every column.
+    /// The tolerance of every column.
     pub all: Option<f64>,
-    /// Of single columns, with the unit in which it was given.
+    /// Tolerances of single columns, each with the unit in which it was given.
     pub columns: BTreeMap<String, (f64, Option<Unit>)>,
 }
 
@@ -147,7 +147,7 @@ pub struct DiffedTable {
     pub path: String,
     /// `prediction/1.0.0`.
     pub schema: Option<String>,
-    /// Of its content, where the file carries it.
+    /// Hash of its content, where the file carries it.
     pub table_hash: Option<String>,
     /// How many.
     pub rows: u64,
@@ -196,7 +196,7 @@ pub struct RowCounts {
 pub struct ColumnDiff {
     /// Its name.
     pub name: String,
-    /// Of tolerance and statistics, A's; `row` where every row has its own.
+    /// Unit of tolerance and statistics, A's; `row` where every row has its own.
     pub unit: String,
     /// Rows with a value in both.
     pub pairs: u64,
@@ -208,7 +208,7 @@ pub struct ColumnDiff {
     pub atol: f64,
     /// Relative tolerance.
     pub rtol: f64,
-    /// Of B minus A over all pairs; null for texts and where rows have units of their own.
+    /// Statistics of B minus A over all pairs; null for texts and where rows have units of their own.
     pub statistics: Option<DifferenceStatistics>,
     /// Largest difference in standard deviations, where the table has them.
     pub max_sigmas: Option<f64>,
@@ -236,7 +236,7 @@ pub struct DifferenceStatistics {
 /// A row that changed, with its cells that changed.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorstRow {
-    /// Of the row, in words.
+    /// Key of the row, in words.
     pub key: String,
     /// What differs in it.
     pub cells: Vec<WorstCell>,
@@ -251,7 +251,7 @@ pub struct WorstCell {
     pub a: serde_json::Value,
     /// In the second table.
     pub b: serde_json::Value,
-    /// Of numbers, in their unit.
+    /// The difference of numbers, in their unit.
     pub difference: Option<f64>,
     /// Empty where there is none.
     pub unit: String,

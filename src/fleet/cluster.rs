@@ -17,7 +17,7 @@ pub struct ClusterOptions {
     pub program: PathBuf,
     /// Absolute, on storage that all nodes share.
     pub store: PathBuf,
-    /// Of the cluster; its default if none.
+    /// The partition of the cluster; its default if none.
     pub partition: Option<String>,
     /// Tasks at once.
     pub max_parallel: Option<u32>,
@@ -31,7 +31,7 @@ pub struct ClusterOptions {
 
 /// The script of one array and the tasks that it takes.
 pub struct Script {
-    /// Of the script.
+    /// Text of the script.
     pub text: String,
     /// How many.
     pub tasks: usize,

@@ -57,7 +57,7 @@ pub struct RobotTable {
 /// Result of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotRecord {
-    /// Of this record.
+    /// Format of this record.
     pub record_format: u32,
     /// Its name.
     pub robot: String,
@@ -141,12 +141,12 @@ pub struct RunNote {
 /// A robot of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Member {
-    /// Of the robot.
+    /// Name of the robot.
     pub name: String,
     /// Its labels.
     #[serde(default)]
     pub groups: Groups,
-    /// Of its record, once there is one.
+    /// Key of its record, once there is one.
     #[serde(default)]
     pub key: Option<String>,
 }

@@ -48,7 +48,7 @@ pub(super) struct Earlier {
 }
 
 impl Earlier {
-    /// Of the fleet that the file names as `previous`; fails where there is none.
+    /// The latest run of the fleet that the file names as `previous`, if it names one; fails where that fleet has none.
     pub fn find(fleet: &Fleet, ledger: &Ledger) -> Result<Option<Self>> {
         fleet.file.previous.as_ref().map(|previous| Self::named(&previous.fleet, "previous.fleet", ledger)).transpose()
     }

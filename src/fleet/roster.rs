@@ -73,7 +73,7 @@ impl Roster {
         if troubles.is_empty() { Ok(Self(robots)) } else { Err(faulty(&path.display().to_string(), troubles)) }
     }
 
-    /// Of a robot by its name.
+    /// The position of a robot by its name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.0.iter().position(|robot| robot.name == name)
     }

@@ -51,22 +51,22 @@ pub type InertiaMoments = [f64; 6];
 /// How far declared masses may be off without being a finding: one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MassTolerance {
-    /// Of a mass, as a share of it.
+    /// Tolerance of a mass, as a share of it.
     pub mass: f64,
-    /// Of each coordinate of a centre, m.
+    /// Tolerance of each coordinate of a centre, m.
     pub centre: f64,
-    /// Of an inertia, as a share of it.
+    /// Tolerance of an inertia, as a share of it.
     pub inertia: f64,
 }
 
 /// What is declared of the bodies beyond masses and centres, for an arm whose torques are simulated.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DeclaredInertias {
-    /// Of each link; empty, or one for each joint.
+    /// Inertias of each link; empty, or one for each joint.
     pub links: Vec<Option<InertiaMoments>>,
-    /// Of the payload.
+    /// Inertia of the payload.
     pub payload: Option<InertiaMoments>,
-    /// Of links, and of last link and payload together.
+    /// Tolerance of links, and of last link and payload together.
     pub tolerance: Option<MassTolerance>,
 }
 

@@ -49,7 +49,7 @@ pub struct IdentifiedModel {
     pub torques: Option<IdentifiedTorques>,
     /// What was learned on top, if anything.
     pub correction: Option<Correction>,
-    /// Of the estimated parameters, where it is known.
+    /// Covariance of the estimated parameters, where it is known.
     pub covariance: Option<Covariance>,
     /// How the arm scatters about the model.
     pub scatter: Scatter,

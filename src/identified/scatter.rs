@@ -8,7 +8,7 @@ use crate::store::TableRef;
 use crate::store::frame::Frame;
 use crate::table::{Corrections, Observability, Prediction, Verdict};
 
-/// Of the stage whose model stands, and of the one that learned a correction on top of it.
+/// The scatter by the stage whose model stands, and by the one that learned a correction on top of it.
 pub(super) fn of(
     stage: &StageReport,
     learned: Option<&StageReport>,

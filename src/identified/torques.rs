@@ -34,7 +34,7 @@ pub struct IdentifiedTorques {
 const OF_THE_RECORDING: [&str; 2] = ["current_latency", "contact"];
 
 impl IdentifiedTorques {
-    /// Of a table of a robot. Fails where the table is no model of torques or the arm has joints that slide.
+    /// The model in a table, for a robot. Fails where the table is no model of torques or the arm has joints that slide.
     pub(super) fn of(robot: &RobotDescription, parameters: TorqueParameters, origin: String) -> Result<Self> {
         let (arm, _) = dynamic_arm(robot)?;
         let model = parameters.to_model()?;
@@ -54,7 +54,7 @@ impl IdentifiedTorques {
         Ok(Self { arm, model, parameters, per_ampere, of_the_recording, origin, warnings, refusals })
     }
 
-    /// Of the stage `step` of a run, else of the last that identified torques; none where none did.
+    /// The model of the stage `step` of a run, else of the last that identified torques; none where none did.
     pub(super) fn of_run(
         manifest: &Manifest,
         step: Option<&str>,

@@ -26,7 +26,7 @@ pub(super) struct Sheet {
     pub comment: Option<&'static str>,
     pub header_in_comment: bool,
     pub header: bool,
-    /// Of a file without a header the numbers from 1.
+    /// Names of the columns; in a file without a header the numbers from 1.
     pub names: Vec<String>,
     /// From a row of units.
     pub units: Vec<Option<&'static str>>,

@@ -84,8 +84,8 @@ pub(super) fn is_whole(file: &ExaminedFile) -> bool {
     file.get("q").is_some() && file.get("x").is_some()
 }
 
-/// Of a file of joints and lists of points in one layout, a reflector each, all lists but the first, with the reflectors' names; the first
-/// file has the joints then, the second the points of the first reflector. Nothing of other files.
+/// Takes out all lists of points but the first, with the reflectors' names, where the files are one of joints and lists of points in one
+/// layout, a reflector each; the first file has the joints then, the second the points of the first reflector. Nothing of other files.
 pub(super) fn other_reflectors(found: &mut Vec<ExaminedFile>) -> Vec<(String, ExaminedFile)> {
     let is_list = |file: &ExaminedFile| file.get("x").is_some() && file.get("q").is_none() && file.get("target").is_none();
     let Some(joints) = found.iter().position(|file| file.get("q").is_some() && file.get("x").is_none()) else {

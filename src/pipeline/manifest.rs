@@ -36,11 +36,11 @@ pub struct Surroundings {
 pub struct Tool {
     /// `calib`.
     pub name: String,
-    /// Of the package.
+    /// Version of the package.
     pub version: String,
     /// Architecture and operating system.
     pub target: String,
-    /// Of the sources and of the compiler, where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
+    /// Revision of the sources; it and `rustc` are known where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
     #[serde(default)]
     pub revision: Option<String>,
     /// Version of the compiler.
@@ -51,11 +51,11 @@ pub struct Tool {
 /// The machine that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Host {
-    /// Of the machine.
+    /// Name of the machine.
     pub name: String,
     /// Operating system.
     pub os: String,
-    /// Of the processor.
+    /// Architecture of the processor.
     pub architecture: String,
     /// That the process may use.
     pub cores: usize,
@@ -90,7 +90,7 @@ pub struct Manifest {
     pub environment: BTreeMap<String, String>,
     /// As it was typed, word by word.
     pub command_line: Vec<String>,
-    /// Of the pipeline.
+    /// The seed of the pipeline.
     pub seed: u64,
     /// Worker threads.
     pub jobs: usize,
@@ -100,7 +100,7 @@ pub struct Manifest {
     pub ended: Option<String>,
     /// From start to end.
     pub wall_seconds: Option<f64>,
-    /// Of the whole process up to the end of this run.
+    /// The most memory that the whole process had in use up to the end of this run.
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
     /// In the order of the pipeline.
@@ -123,7 +123,7 @@ pub enum RunStatus {
 pub struct PipelineRecord {
     pub name: String,
     pub file: String,
-    /// Of the YAML file's bytes.
+    /// Hash of the YAML file's bytes.
     pub blake3: String,
     pub text: String,
     /// With variables and overrides filled in.
@@ -171,7 +171,7 @@ pub struct StageReport {
     pub notes: Vec<String>,
     /// What it warned of.
     pub warnings: Vec<String>,
-    /// Of the execution, also where it was an earlier run's.
+    /// Duration of the execution, also where it was an earlier run's.
     pub wall_seconds: Option<f64>,
 }
 

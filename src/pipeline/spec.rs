@@ -20,9 +20,9 @@ pub(super) struct Draft {
     pub stages: Vec<StageDraft>,
     /// The YAML with variables and overrides filled in.
     pub resolved: serde_json::Value,
-    /// Of the command line.
+    /// Faults of the command line.
     pub faults: Vec<Fault>,
-    /// Of the file.
+    /// Faults of the file, with their places.
     pub troubles: Vec<Trouble>,
 }
 

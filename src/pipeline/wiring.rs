@@ -74,7 +74,7 @@ fn by_kind(earlier: &[StageDraft], port: Port) -> Vec<Origin> {
         let matching = || outputs.iter().enumerate().filter(|(_, output)| output.kind == port.kind);
         match port.arity {
             Arity::Every => origins.extend(matching().map(|(port, _)| Origin { stage, port })),
-            // Of several outputs of one kind, the one that bears the kind's name.
+            // Where several outputs are of one kind, the one that bears the kind's name is read.
             Arity::One | Arity::Optional => {
                 let best = matching().find(|(_, output)| output.name == port.kind).or_else(|| matching().next_back());
                 if let Some((port, _)) = best {

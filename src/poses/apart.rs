@@ -159,7 +159,7 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     if list.is_empty() {
         return Err(Error::spec(place, "has no finding that could be separated from another cause"));
     }
-    // Of equals the first by name, as the table is sorted.
+    // The first by name of equally close rivals, as the table is sorted.
     let closest = |row: &FindingRow| {
         let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
         own.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))

@@ -13,9 +13,9 @@ pub(super) enum FlowStep {
     ElseIf,
     Else,
     EndIf,
-    /// Of which the body may be left out.
+    /// A loop whose body may be left out.
     While,
-    /// Of which it runs.
+    /// A loop whose body runs at least once.
     Loop,
     /// The loop goes on or ends here.
     EndLoop,
@@ -77,7 +77,7 @@ struct Builder {
 }
 
 impl Flow {
-    /// Of the lines of a file; fails at a line whose block does not fit.
+    /// The order of the lines of a file; fails at a line whose block does not fit.
     pub fn of(lines: &[FlowLine]) -> Result<Self, usize> {
         let mut builder = Builder { next: vec![Vec::new(); lines.len()], ..Builder::default() };
         for (at, line) in lines.iter().enumerate() {

@@ -78,7 +78,7 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
     let given = &literal.values[3..];
     if literal.kind == TargetKind::Frame {
         let (c, b, a) = rotation.euler_angles();
-        // Of the angles that turn alike those next to the given, so that 180 does not become -180.
+        // One rotation has several sets of angles: those nearest to the given are taken, so that 180 does not become -180.
         let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();
         let alike = [[a, b, c], [a + PI, PI - b, c + PI]].map(|angles| {
             let angles: Vec<f64> = angles.iter().zip(given).map(|(angle, given)| near(angle.to_degrees(), *given)).collect();

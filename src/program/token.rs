@@ -20,7 +20,7 @@ pub(super) enum TokenKind {
     Sign(u8),
     /// `:=`, `==`, `<=`, `>=`, `<>`, by their first byte.
     Pair(u8),
-    /// Of KRL, whose statements end with their line.
+    /// The end of a line of KRL, whose statements end with their line.
     LineEnd,
 }
 

@@ -26,7 +26,7 @@ pub enum RobotTool {
 }
 
 impl RobotTool {
-    /// Of a name, a number, or `X,Y,Z,A,B,C` in mm and deg; fails where it is none of them.
+    /// The tool by a name, a number, or `X,Y,Z,A,B,C` in mm and deg; fails where the text is none of them.
     pub fn parse(text: &str) -> Result<Self, String> {
         if !text.contains(',') {
             let named = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// 1e-9 deg is 0.00005 um at 3 m.
 const DECIMALS: Decimals = Decimals { angle: 9, length: 9, time: 2 };
-/// Of a moving arm a microsecond counts.
+/// Decimals for a moving arm: a microsecond counts.
 const MOVING: Decimals = Decimals { time: 6, ..DECIMALS };
 
 /// The files by their names; of an arm that `moves` times are finer. Fails with a sentence where the layout cannot hold the robot.
@@ -34,7 +34,7 @@ pub fn recorded(
     Ok(files)
 }
 
-/// Of a recording at fixtures the joints of each, rad (m of a prismatic joint), a file without a header under its name.
+/// The joints of a recording at each fixture, rad (m of a prismatic joint), a file without a header under the fixture's name.
 fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {

@@ -13,7 +13,7 @@ pub fn is_utf16(head: &[u8]) -> bool {
 /// Reads UTF-16 with a byte-order mark and gives UTF-8 without one; half a letter becomes U+FFFD.
 pub struct Utf16Reader<R> {
     source: R,
-    /// Of the mark; none before it was read.
+    /// Whether the mark is that of little-endian text; none before it was read.
     little: Option<bool>,
     /// A byte without its second, and a unit without the second of its pair.
     half: Option<u8>,
@@ -23,7 +23,7 @@ pub struct Utf16Reader<R> {
 }
 
 impl<R: BufRead> Utf16Reader<R> {
-    /// Of a source that stands at its byte-order mark.
+    /// A reader of a source that stands at its byte-order mark.
     pub fn new(source: R) -> Self {
         Self { source, little: None, half: None, lead: None, ready: Vec::new(), given: 0 }
     }

@@ -14,7 +14,7 @@ pub struct AchievedTables<'a> {
     pub model: &'a str,
     /// Name, mean, 95th percentile, largest, and what they are of.
     pub rows: Vec<(&'static str, [f64; 3], String)>,
-    /// Of the uncorrected targets, by the model, and of the measured points.
+    /// Errors of the uncorrected targets, by the model, and of the measured points.
     pub errors: [Vec<f64>; 2],
     /// Cycles, accuracy and repeatability.
     pub poses: Vec<(usize, f64, f64)>,

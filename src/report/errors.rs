@@ -136,7 +136,7 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Value {
         "step": steps.called(&row.step),
         "colour": steps.colour(row.order),
         "points": count(row.points),
-        // Of the step that stands.
+        // Whether it is the step that stands.
         "last": Some(row.order) == steps.standing(),
         // mean, std, p95, max, rms, median, rms x, y, z, noise.
         "values": values.into_iter().map(mm).collect::<Vec<_>>(),

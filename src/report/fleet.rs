@@ -23,7 +23,7 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
     let page = json!({
         // So many more of them, which stand at the head of the table.
         "more": urgent.clone().count().saturating_sub(NAMED),
-        // Of the robots those that need a technician, the most urgent first.
+        // The robots that need a technician, the most urgent first.
         "urgent": urgent.take(NAMED).collect::<Vec<_>>(),
         "name": name,
         "title": format!("Fleet {name}"),

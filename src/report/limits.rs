@@ -8,11 +8,11 @@ use crate::table::{AcceptanceRow, StatisticsRow};
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AcceptanceLimits {
-    /// Of the held-out points.
+    /// Largest mean error of the held-out points.
     pub mean_mm: Option<f64>,
-    /// Of the held-out points, 95th percentile.
+    /// Largest 95th percentile of the errors of the held-out points.
     pub p95_mm: Option<f64>,
-    /// Of the held-out points.
+    /// Largest error of any held-out point.
     pub max_mm: Option<f64>,
 }
 

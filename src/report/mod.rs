@@ -42,9 +42,9 @@ use std::collections::BTreeMap;
 pub struct Tables {
     /// Errors of every step and set.
     pub statistics: Statistics,
-    /// Of every step that predicts.
+    /// Predictions of every step that predicts.
     pub prediction: Vec<Prediction>,
-    /// Of the last identified model.
+    /// Parameters of the last identified model.
     pub parameters: Parameters,
     /// The nominal arm.
     pub robot: Robot,
@@ -66,15 +66,15 @@ pub struct Tables {
     pub training: Vec<Training>,
     /// Rivals of learned corrections.
     pub corrections: Vec<Corrections>,
-    /// Of every diagnosis.
+    /// The verdict of every diagnosis.
     pub verdict: Vec<Verdict>,
-    /// Of every diagnosis.
+    /// Sentences of the verdict of every diagnosis.
     pub sentences: Vec<VerdictSentences>,
-    /// Of every diagnosis.
+    /// Findings of every diagnosis.
     pub findings: Vec<Findings>,
-    /// Of every diagnosis.
+    /// Numbers of the findings of every diagnosis.
     pub finding_numbers: Vec<FindingNumbers>,
-    /// Of every diagnosis.
+    /// Rivals of the findings of every diagnosis.
     pub rivals: Vec<Rivals>,
     /// Formulas of findings without a name.
     pub forms: Vec<Forms>,
@@ -103,7 +103,7 @@ pub struct ReportOptions<'a> {
     pub set: Option<&'a str>,
     /// What the user calls good enough.
     pub limits: AcceptanceLimits,
-    /// Of the page; its JSON is English.
+    /// Language of the page; its JSON is English.
     pub language: PageLanguage,
     /// Who, with what, where and when: shown as it was given.
     pub identity: &'a BTreeMap<String, String>,

@@ -13,7 +13,7 @@ pub(super) struct Dependence {
 }
 
 impl Dependence {
-    /// Of all effects but geometry.
+    /// What all effects but geometry depend on.
     pub fn of(model: &Model) -> Self {
         let mut out = Self { joints: vec![false; model.robot.joints()], payload: false, temperature: false };
         for (effect, _) in model.stack.effects() {

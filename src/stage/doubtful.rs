@@ -11,7 +11,7 @@ use crate::table::{Prediction, PredictionRow};
 /// A model, and where it was measured.
 pub struct KnownModel<'a> {
     pub model: &'a Model,
-    /// Of all of its parameters; none where that is not known.
+    /// Covariance of all of its parameters; none where that is not known.
     pub covariance: Option<&'a Covariance>,
     /// The recording that it was identified by.
     pub measured: &'a Measurements,

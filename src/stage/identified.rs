@@ -124,7 +124,7 @@ pub struct Fitting<'a> {
     /// Parameters that the user holds.
     pub held: &'a [usize],
     pub earlier: Option<&'a Parameters>,
-    /// Of these.
+    /// Covariance of the earlier parameters.
     pub earlier_covariance: Option<&'a CovarianceTable>,
     /// Rows that an earlier step was fitted to.
     pub seen_before: &'a [bool],

@@ -27,7 +27,7 @@ pub struct Optimise {
     pub evaluations: u64,
     /// Searches of every method on every problem.
     pub seeds: usize,
-    /// Of so many searches each the whole course is kept.
+    /// Searches of every method on every problem of which the whole course is kept.
     pub courses: usize,
     /// Published times to stand beside ours.
     pub reference: Vec<PublishedTime>,

@@ -39,7 +39,7 @@ pub struct Accepted {
     pub mean_mm: Option<f64>,
     /// 95 % of the points.
     pub p95_mm: Option<f64>,
-    /// Of the worst point.
+    /// Error of the worst point.
     pub max_mm: Option<f64>,
 }
 

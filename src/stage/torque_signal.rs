@@ -16,12 +16,12 @@ pub(super) struct RecordedTorques<'a> {
     joints: usize,
     /// Nm per A of each joint, where motor currents were recorded.
     factor: Option<Vec<f64>>,
-    /// Of a chunk, the number of its first row and a row of it; without it nothing is held out.
+    /// Whether a row of a chunk is held out, by the number of the chunk's first row and its own in the chunk; without it none is.
     held_out: Option<Box<HeldOut<'a>>>,
 }
 
 impl<'a> RecordedTorques<'a> {
-    /// Of a motion. Fails where it has neither torques nor currents, or the robot file does not say what an ampere is.
+    /// The torques of a motion. Fails where it has neither torques nor currents, or the robot file does not say what an ampere is.
     pub fn of(motion: &'a Chunks<ArmMotion>, robot: &RobotDescription) -> Result<Self> {
         let mut seen = None;
         motion.each(|chunk| {

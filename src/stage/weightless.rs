@@ -15,7 +15,7 @@ pub(super) struct WeightlessLinks {
     pub warning: String,
 }
 
-/// Of some rows; none where all masses are known, or weight turns no joint.
+/// What is said of links without masses at some rows; none where all masses are known, or weight turns no joint.
 pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<WeightlessLinks> {
     let joints = &robot.description().joints;
     let bare = joints.iter().filter(|joint| joint.mass.is_none() || joint.centre.is_none()).count();

@@ -22,7 +22,7 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
-    /// Of this record.
+    /// Format of this record.
     pub record_format: u32,
     /// Hash of the key.
     pub id: ActionId,
@@ -46,7 +46,7 @@ pub struct Account {
     pub ended: String,
     /// From start to end.
     pub wall_seconds: f64,
-    /// Of all threads, where known.
+    /// Processor time of all threads, where known.
     pub cpu_seconds: Option<f64>,
     /// What the stage told.
     pub notes: Vec<String>,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 /// A Rust type that is one cell of a column.
 pub trait Cell: Sized + Clone {
-    /// Of its column.
+    /// The type of its column.
     fn data_type() -> DataType;
     /// Whether the column may hold nulls.
     fn nullable() -> bool {

@@ -16,7 +16,7 @@ pub const KEY_FORMAT: u32 = 1;
 /// Everything that the outputs of a stage depend on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageKey {
-    /// Of this key.
+    /// Format of this key.
     pub key_format: u32,
     /// The stage's id: the `step` of its tables.
     pub id: String,
@@ -32,7 +32,7 @@ pub struct StageKey {
     pub files: BTreeMap<String, FileKey>,
     /// Output schemas (`name/version`) by port.
     pub schemas: BTreeMap<String, String>,
-    /// Of the stage.
+    /// The seed of the stage.
     pub seed: u64,
 }
 
@@ -42,7 +42,7 @@ pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
-    /// Of its content.
+    /// Hash of its content.
     pub table: TableHash,
 }
 
@@ -51,7 +51,7 @@ pub struct ReadKey {
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
     pub name: String,
-    /// Of its bytes.
+    /// Hash of its bytes.
     pub content: FileHash,
 }
 

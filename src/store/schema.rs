@@ -35,9 +35,9 @@ pub fn of(kind: &str) -> Result<&'static TableSchema> {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableSchema {
-    /// Of the kind of table.
+    /// Name of the kind of table.
     pub name: String,
-    /// Of the schema.
+    /// Version of the schema.
     pub version: Version,
     /// What a row is.
     pub description: String,
@@ -53,7 +53,7 @@ pub struct TableSchema {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSchema {
-    /// Of the column; `{j}` stands for a joint.
+    /// Name of the column; `{j}` stands for a joint.
     pub name: String,
     /// As it is stored.
     #[serde(rename = "type")]
@@ -81,7 +81,7 @@ pub struct FieldSchema {
     /// Whether it is a column for each joint.
     #[serde(default)]
     pub per_joint: bool,
-    /// Of joints: this column or that one is there, by the kind of the joint.
+    /// Group of columns of which each joint has one, by the kind of the joint.
     #[serde(default)]
     pub either: Option<String>,
 }

@@ -22,7 +22,7 @@ pub struct Sweep {
     pub actions: u64,
     /// Tables that go.
     pub objects: u64,
-    /// Of the tables that go.
+    /// Bytes of the records and tables that go.
     pub bytes: u64,
     /// Records that stay.
     pub kept_actions: u64,

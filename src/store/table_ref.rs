@@ -17,7 +17,7 @@ pub struct TableRef {
     pub file_hash: FileHash,
     /// How many.
     pub rows: u64,
-    /// Of the file.
+    /// Size of the file, bytes.
     pub bytes: u64,
 }
 

@@ -19,7 +19,7 @@ use crate::error::{Error, Fault, Result};
 pub struct Verification {
     /// Tables that were read.
     pub objects: u64,
-    /// Of these tables.
+    /// Bytes of these tables.
     pub bytes: u64,
     /// Records that were read.
     pub actions: u64,

@@ -8,8 +8,8 @@ use crate::stage::{DIAGNOSES, Stage, Transfer};
 use crate::store::Store;
 use crate::table::{Standing, StatisticsRow};
 
-/// Of the set with most points that the step which stands was not fitted to, else of the one that it was fitted to; nothing where no stage
-/// stated errors; where a model is carried to another recording, what it does there. Of a `wrong` set-up nothing else is said.
+/// The errors at the largest set that the step which stands was not fitted to, else at the one that it was fitted to; nothing where no
+/// stage stated errors or diagnosed; where a model is carried to another recording, what it does there. A `wrong` set-up is stated alone.
 pub fn in_short(
     outcome: &CompletedRun,
     standing: Option<&Standing>,

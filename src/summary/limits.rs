@@ -30,12 +30,12 @@ struct Figure {
 }
 
 impl LimitsSummary {
-    /// Of all reports of a run. Fails where a table has left the store, or a report is older than the table.
+    /// The judgements of all reports of a run. Fails where a table has left the store, or a report is older than the table.
     pub fn read(outcome: &CompletedRun, store: &Store) -> Result<Self> {
         Self::of(&outcome.manifest, store)
     }
 
-    /// Of all reports of the record of a run.
+    /// The judgements of all reports of the record of a run.
     pub fn of(manifest: &Manifest, store: &Store) -> Result<Self> {
         let mut all = Vec::new();
         for stage in manifest.stages.iter().filter(|stage| stage.uses == Report::NAME && !stage.outputs.is_empty()) {

@@ -4,7 +4,7 @@ use super::{BodyConsistencies, BodyConsistencyRow};
 use crate::dynamics::{BodyConsistency, TorqueDiagnosis};
 
 impl BodyConsistencies {
-    /// Of a diagnosis.
+    /// The table of a diagnosis.
     pub fn of(diagnosis: &TorqueDiagnosis) -> Self {
         let enforced = diagnosis.enforced.as_ref();
         let row = |found: BodyConsistency| BodyConsistencyRow {

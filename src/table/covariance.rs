@@ -6,7 +6,7 @@ use crate::estimate::{Covariance, Fitted, Model};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl CovarianceTable {
-    /// Of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top of them is held to be independent.
+    /// The covariance of a fit. Parameters that it kept are taken over from `earlier`: what was estimated on top is held to be independent.
     pub fn of(model: &Model, fitted: &Fitted, earlier: Option<&Self>) -> Self {
         let specs = model.stack.specs();
         let own = fitted.covariance.iter().flat_map(|covariance| covariance.pairs());

@@ -4,7 +4,7 @@ use super::{FormRow, Forms};
 use crate::diagnose::Diagnosis;
 
 impl Forms {
-    /// Of a diagnosis.
+    /// The formulas of a diagnosis.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let (mut rows, mut last, mut form) = (Vec::new(), None, 0);
         for one in &diagnosis.formulas {

@@ -22,9 +22,9 @@ type ErrorsByRow = BTreeMap<i64, f64>;
 /// Errors of the whole points that a step did not see, its suspects apart.
 #[derive(Debug, Clone, Default)]
 pub struct Unseen {
-    /// Of rows that it was fitted to, by fits without their folds.
+    /// Errors of rows that it was fitted to, by fits without their folds.
     folds: ErrorsByRow,
-    /// Of all other rows.
+    /// Errors of all other rows.
     held_out: ErrorsByRow,
     /// Rows that it, or a step before it, was fitted to.
     fitted: BTreeSet<i64>,
@@ -242,7 +242,7 @@ mod tests {
         assert_eq!((found.step.as_str(), found.model.as_str()), ("geometry", "geometry"));
         let [gone] = found.withdrawn.as_slice() else { panic!("{:?}", found.withdrawn) };
         assert_eq!((gone.step.as_str(), gone.than.as_str(), gone.points), ("diagnose", "geometry", 40));
-        // Of errors m (1, 1.1, 1.2) in turn, 14, 13 and 13 of them, the mean square is 1.21125 m2.
+        // The mean square of errors m (1, 1.1, 1.2) in turn, 14, 13 and 13 of them, is 1.21125 m2.
         assert!(
             (gone.rms_mm - 0.498 * 1.21125f64.sqrt()).abs() < 1e-9
                 && (gone.than_rms_mm / gone.rms_mm - 0.232 / 0.498).abs() < 1e-9

@@ -4,7 +4,7 @@ use super::{TorqueChangeRow, TorqueChangeTable};
 use crate::dynamics::TorqueChanges;
 
 impl TorqueChangeTable {
-    /// Of a comparison; `previous` gives a number of the earlier model by name.
+    /// The table of a comparison; `previous` gives a number of the earlier model by name.
     pub fn of(changes: &TorqueChanges, previous: impl Fn(&str) -> Option<f64>) -> Self {
         let rows = changes.changes.iter().map(|change| TorqueChangeRow {
             name: change.name.clone(),

@@ -18,7 +18,7 @@ struct TermForm {
 const SURE: f64 = 3.0;
 const LINKS: &str = "rigid_body";
 const SEEN: &str = "recording";
-/// Of a joint's range, in the order of [`ends`].
+/// Numbers of a joint's range, in the order of [`ends`].
 const RANGE: [(&str, &str); 8] = [
     ("position_least", "rad"),
     ("position_greatest", "rad"),
@@ -29,7 +29,7 @@ const RANGE: [(&str, &str); 8] = [
     ("u95_usual", "Nm"),
     ("sign_width", "rad/s"),
 ];
-/// Of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
+/// Numbers of the recording as a whole: width of a sign, latency, cut-off, by how much friction turns before the velocity.
 const WHOLE: [(&str, &str); 4] = [("sign_width", "rad/s"), ("latency", "s"), ("cutoff", "Hz"), ("friction_lead", "s")];
 
 /// Where it was recorded, C.
@@ -45,7 +45,7 @@ fn fault(message: String) -> Error {
 }
 
 impl TorqueParameters {
-    /// Of a model. Fails where a term has no cause.
+    /// The table of a model. Fails where a term has no cause.
     pub fn of(model: &TorqueModel) -> Result<Self> {
         let names = model.names()?;
         let width = names.len();
@@ -218,7 +218,7 @@ fn term(rows: &[&TorqueParameterRow]) -> Result<TorqueTerm> {
 }
 
 impl TorqueCovariance {
-    /// Of a model. Fails where a term has no cause.
+    /// The covariance of a model. Fails where a term has no cause.
     pub fn of(model: &TorqueModel) -> Result<Self> {
         let names = model.names()?;
         let width = names.len();

@@ -36,9 +36,9 @@ impl ColumnRole {
 /// Units of columns whose names do not end in one.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Units {
-    /// Of angles whose column names none.
+    /// Unit of angles whose column names none.
     pub angle: Option<Unit>,
-    /// Of lengths whose column names none.
+    /// Unit of lengths whose column names none.
     pub length: Option<Unit>,
 }
 

@@ -28,7 +28,7 @@ pub struct Layout<'a> {
     pub place: &'a str,
     /// Whose joint names columns may carry.
     pub robot: &'a RobotDescription,
-    /// Of columns that name none.
+    /// Units of columns that name none.
     pub units: Units,
     /// Appends nothing: joints are replaced, all else stays.
     pub plain: bool,

@@ -7,7 +7,7 @@ use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
 use crate::error::{Error, Fault, Result};
 
-/// Of the usual step of the clock: what a step may be off.
+/// What a step of the clock may be off, as a share of the usual step.
 const UNEVEN: f64 = 0.02;
 /// Decimals of torques (Nm) and currents (A).
 const DECIMALS: usize = 6;

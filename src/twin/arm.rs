@@ -21,7 +21,7 @@ pub struct Link {
     pub tilt: Matrix,
     /// kg, and its centre in the frame of the link, m.
     pub mass: f64,
-    /// Of its mass, m.
+    /// Centre of its mass, m.
     pub centre: Vector,
     /// Motor turns per turn of the joint; 1 where unknown.
     pub gear: f64,

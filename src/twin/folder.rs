@@ -11,18 +11,18 @@ const TRACKER_LATER_S: f64 = 1.5;
 /// Decimals of what is written: joint angles in deg and deg/s, coordinates in mm, times in s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals {
-    /// Of angles.
+    /// Decimals of angles.
     pub angle: usize,
-    /// Of coordinates.
+    /// Decimals of coordinates.
     pub length: usize,
-    /// Of times.
+    /// Decimals of times.
     pub time: usize,
 }
 
 /// A recording in SI; per-joint quantities are row-major. A quantity that is missing is not written.
 #[derive(Debug, Clone)]
 pub struct Log {
-    /// Of the arm.
+    /// Joints of the arm.
     pub joints: usize,
     /// Names of the points.
     pub id: Vec<String>,

@@ -12,15 +12,15 @@ pub fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
 /// What effects do to the arm.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Of the tracker's frame.
+    /// Motion of the tracker's frame.
     pub tracker: Matrix,
-    /// Of the base, base frame.
+    /// Motion of the base, base frame.
     pub base: Matrix,
     /// Added to each joint, rad or m.
     pub joint: Vec<f64>,
-    /// Of each link's far end, in the frame of the link, about that end.
+    /// Motion of each link's far end, in the frame of the link, about that end.
     pub link_end: Vec<Matrix>,
-    /// Of the measured point, last link's frame, m.
+    /// Shift of the measured point, last link's frame, m.
     pub tool: Vector,
     /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
     pub load: Vec<f64>,

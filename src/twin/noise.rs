@@ -8,13 +8,13 @@ use rand::{RngExt, SeedableRng};
 pub enum Purpose {
     /// Which poses are measured.
     Poses = 1,
-    /// Of the tracker's points.
+    /// Noise of the tracker's points.
     Tracker = 2,
-    /// Of motor currents.
+    /// Noise of motor currents.
     Current = 3,
-    /// Of joints from move to move.
+    /// Scatter of joints from move to move.
     Repeatability = 4,
-    /// Of the pace of measurement.
+    /// The pace of measurement.
     Clock = 5,
     /// What is concealed, and how.
     Design = 6,

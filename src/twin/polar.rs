@@ -14,7 +14,7 @@ pub struct Polar {
 }
 
 impl Polar {
-    /// Of a point as the instrument sees it, m.
+    /// The range and the angles of a point as the instrument sees it, m.
     pub fn of(point: Vector) -> Polar {
         let level = point[0].hypot(point[1]);
         Polar { range: matrix::norm(point), azimuth: point[1].atan2(point[0]), elevation: point[2].atan2(level) }

@@ -48,7 +48,7 @@ pub struct Experiment<'a> {
     pub blocks: &'a [Block],
     /// Clock and temperature.
     pub climate: &'a Climate,
-    /// Of poses and noise.
+    /// The seed of poses and noise.
     pub seed: u64,
 }
 

@@ -61,7 +61,7 @@ pub struct Row {
     pub temperature_c: f64,
     /// Declared, kg.
     pub payload_kg: f64,
-    /// Of each joint, rad/s or m/s; empty where the arm stands.
+    /// Velocity of each joint, rad/s or m/s; empty where the arm stands.
     pub velocity: Vec<f64>,
     /// What each effect that acts makes of the rows before, in the order of the effects; empty: they make nothing of them.
     pub memory: Vec<f64>,

@@ -24,10 +24,10 @@ pub struct Fixture {
     pub name: String,
     /// Its centre; of a plane the middle of where it is touched, mm.
     pub centre_mm: Vector,
-    /// Of a plane: a vector along its normal.
+    /// A vector along the normal of a plane.
     #[serde(default)]
     pub normal: Option<Vector>,
-    /// Of a sphere its radius together with the ball's; of a plane how far from its middle it is touched, mm.
+    /// Radius of a sphere together with the ball's; for a plane that of the disc in which it is touched, mm.
     #[serde(default)]
     pub radius_mm: Option<f64>,
     /// How often the ball is brought there.
@@ -74,7 +74,7 @@ const TRIES: usize = 3000;
 const STEPS: usize = 30;
 /// m; the ball is there.
 const THERE: f64 = 1e-10;
-/// Of differences, rad or m.
+/// Step of differences, rad or m.
 const STEP: f64 = 1e-6;
 /// A step turns no joint farther, rad or m.
 const FAR: f64 = 0.4;

@@ -3,7 +3,7 @@
 /// A true number under its canonical name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueValue {
-    /// Of the number.
+    /// Name of the number.
     pub name: String,
     /// Canonical name.
     pub effect: &'static str,

@@ -53,7 +53,7 @@ pub struct Header<'a> {
 }
 
 impl<'a> Header<'a> {
-    /// Of a name in small letters: `x [mm]`, `q1_deg`, `load kg`, `x/mm`, `x in mm`.
+    /// The parts of a name in small letters: `x [mm]`, `q1_deg`, `load kg`, `x/mm`, `x in mm`.
     pub fn of(lower: &'a str) -> Self {
         for (open, close) in [('[', ']'), ('(', ')')] {
             if let Some((stem, inside)) = lower.strip_suffix(close).and_then(|text| text.rsplit_once(open))

@@ -25,7 +25,7 @@ criteria! {
     FINE: usize = 16, "cosines", "judgement: bounds time", "";
     /// Cosines over any other variable.
     COARSE: usize = 8, "cosines", "judgement: bounds time", "";
-    /// Of what is tried with several numbers; the best of them is looked at again with [`FINE`] ones.
+    /// Cosines over a variable that is tried with several numbers; the best of these is looked at again with [`FINE`] ones.
     SKETCH: usize = 4, "cosines", "judgement: bounds time", "";
     /// Cosines of each of two variables.
     EACH: usize = 4, "cosines", "judgement: bounds time", "";

@@ -16,8 +16,8 @@ criteria! {
     OWN_NUMBERS: f64 = 2.0, "ratio", "judgement: one number explains less than that", "";
     /// Others that leave no more than so many times as much explain as well.
     ALIKE: f64 = 1.3, "ratio", "judgement: noise of small recordings", "";
-    /// Of those that leave no more than so many times as much, and are all but the same by kinematics, the list's first counts:
-    /// a sign is wrong more often than a zero by half a turn.
+    /// Where set-up errors leave no more than so many times the least, and are all but the same by kinematics, the first of
+    /// the list counts: a sign is wrong more often than a zero by half a turn.
     SAME: f64 = 1.02, "ratio", "judgement: rounding of fits", "";
     /// Set-up errors that are tried together with another where none explains alone.
     SECOND: usize = 6, "errors", "judgement: bounds time", "";
@@ -59,6 +59,6 @@ criteria! {
     TRIM: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// Arms that reach less far, or farther, are not what a robot file in the right unit describes.
     ARMS: [f64; 2] = [0.05, 50.0], "m", "physics: smallest and largest arms", "";
-    /// Of the largest part of a displacement, what is not worth a word.
+    /// Parts of a displacement below this share of the largest are not stated.
     SMALL: f64 = 0.05, "share", "judgement: a twentieth", "";
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Sizes of what is left: lengths (m), or angles (rad) where no row to fit measured a length.
 pub(crate) struct Misfit {
     pub dimension: Dimension,
-    /// Of every row, where it measured something of the dimension.
+    /// Size of what is left of every row, where it measured something of the dimension.
     pub sizes: Vec<Option<f64>>,
     /// Held-out rows that belong; where there are none, those that were fitted.
     pub rows: Vec<usize>,
@@ -67,7 +67,7 @@ fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
 }
 
 impl Misfit {
-    /// Of a model, of which so many parameters were estimated.
+    /// The misfit of a model, of which so many parameters were estimated.
     pub fn of(question: &Question, data: &Measurements, screening: &Screening, model: &Model, parameters: usize) -> Self {
         let dimension = dimension(data, question.fit);
         let left = left(model, data, dimension);

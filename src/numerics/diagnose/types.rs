@@ -27,7 +27,7 @@ pub struct Question<'a> {
     pub own: &'a [&'static DeclaredCause],
     /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
     pub beside_simulation: bool,
-    /// Of the bootstrap and the folds.
+    /// The seed of the bootstrap and the folds.
     pub seed: u64,
 }
 
@@ -43,7 +43,7 @@ pub struct JointRepeatability {
 /// How well a finding stands; of torques, lengths are Nm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Evidence {
-    /// Of the finding beside all others.
+    /// F statistic of the finding beside all others.
     pub f_statistic: f64,
     /// Chance that noise gives as much to this form alone: the search among many is in the probabilities, not in this.
     pub p_value: f64,
@@ -98,7 +98,7 @@ pub struct Finding {
     pub evidence: Option<Evidence>,
     /// Explanations that these data do not exclude, the closest first.
     pub rivals: Vec<RivalCause>,
-    /// Of its name and its place.
+    /// Probabilities of its name and its place.
     pub probabilities: Probabilities,
     /// Joint (from 0) and range (rad) over which it holds, for joint errors.
     pub valid: Option<(usize, [f64; 2])>,
@@ -149,7 +149,7 @@ pub struct ExplainedShare {
     pub by: &'static str,
     /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
     pub name: String,
-    /// Of the squared residual that the base model leaves, in standard deviations.
+    /// Share of the squared residual that the base model leaves, in standard deviations.
     pub share: f64,
     /// How many parameters it takes, which alone explain as many residual rows of noise.
     pub parameters: usize,
@@ -168,7 +168,7 @@ pub struct SpectrumLine {
     pub motor: bool,
     /// Periods per turn of the joint.
     pub order: u32,
-    /// Of the squared residual.
+    /// Share of the squared residual.
     pub share: f64,
 }
 
@@ -221,12 +221,12 @@ pub struct ErrorLengths {
 }
 
 impl ErrorLengths {
-    /// Of some rows; `None` of no rows.
+    /// The errors of some rows; `None` where none of them has any.
     pub(crate) fn of(sizes: &[Option<f64>], rows: &[usize]) -> Option<Self> {
         Self::of_lengths(&rows.iter().filter_map(|row| sizes[*row]).collect::<Vec<_>>())
     }
 
-    /// Of lengths, m; `None` of none.
+    /// The errors of lengths, m, or of angles, rad; `None` where there are none.
     pub(crate) fn of_lengths(lengths: &[f64]) -> Option<Self> {
         let count = lengths.len() as f64;
         (count > 0.0).then(|| Self {
@@ -249,7 +249,7 @@ pub struct Diagnosis {
     pub noise_basis: NoiseBasis,
     /// Length of the noise of a row, rms, m.
     pub noise_floor: f64,
-    /// Of held-out rows (of the fitted ones where none are held out), suspects apart.
+    /// Errors without the findings at held-out rows (at the fitted ones where none are held out), suspects apart.
     pub before: Option<ErrorLengths>,
     /// The same with the findings.
     pub after: Option<ErrorLengths>,
@@ -275,13 +275,13 @@ pub struct Diagnosis {
     pub next_measurements: Vec<String>,
     /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise, where that was asked.
     pub leftover_rms: f64,
-    /// Of the fitted rows; 1 for noise alone.
+    /// Reduced chi-square of the fitted rows; 1 for noise alone.
     pub chi_square: f64,
     /// Probability that the residual of the base model is noise.
     pub gate_first: Option<f64>,
     /// The same of the residual with all findings.
     pub gate_last: Option<f64>,
-    /// Of the joints, as the recording shows it.
+    /// Repeatability of the joints, as the recording shows it.
     pub repeatability: JointRepeatability,
     /// Where the residual sits before and after the findings.
     pub located_before: Located,

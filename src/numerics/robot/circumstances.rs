@@ -86,7 +86,7 @@ pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
 pub struct CircumstanceName(&'static str);
 
 impl CircumstanceName {
-    /// Of a declared circumstance; `None` where laws know no such one.
+    /// The name of a declared circumstance; `None` where laws know no such one.
     pub fn of(setting: &str) -> Option<Self> {
         law_columns().find(|column| column.setting == setting).map(|column| Self(column.setting))
     }

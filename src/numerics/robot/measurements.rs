@@ -34,7 +34,7 @@ pub struct Measurements {
     /// Whether the model that predicts these rows knows another clock than theirs and was identified long before. Their times then tell what
     /// lies between them, and nothing else.
     pub long_after: bool,
-    /// Of the arm, C.
+    /// Temperature of the arm, C.
     pub temperature: Option<Vec<f64>>,
     /// Circumstances that declared laws read by name, SI: one number a row, or one for each joint.
     pub circumstances: BTreeMap<&'static str, Vec<f64>>,

@@ -17,12 +17,12 @@ impl PointReadings {
         Self { sigma: vec![Vector3::repeat(sigma); position.len()], position }
     }
 
-    /// Of so many rows none.
+    /// Readings of so many rows, none of which measured a point.
     pub fn none(rows: usize) -> Self {
         Self::new(vec![Vector3::zeros(); rows], f64::INFINITY)
     }
 
-    /// Of some rows, in their order.
+    /// The readings of some rows, in their order.
     pub fn subset(&self, rows: &[usize]) -> Self {
         let of = |all: &[Vector3<f64>]| rows.iter().filter_map(|row| all.get(*row)).copied().collect();
         Self { position: of(&self.position), sigma: of(&self.sigma) }

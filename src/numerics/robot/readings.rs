@@ -36,7 +36,7 @@ pub struct Reading<'a> {
 }
 
 impl Readings {
-    /// Of some rows, in their order.
+    /// The readings of some rows, in their order.
     pub fn subset(&self, rows: &[usize]) -> Self {
         Self {
             kind: self.kind,

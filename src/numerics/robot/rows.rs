@@ -28,7 +28,7 @@ pub struct DhRow {
 pub struct DhTable {
     /// From the base's z axis to the first joint's.
     pub base: DhRow,
-    /// Of each joint at position zero; the last is the identity.
+    /// The row of each joint at position zero; the last is the identity.
     pub joints: Vec<DhRow>,
     /// In the frame of the last joint.
     pub tool: Pose,

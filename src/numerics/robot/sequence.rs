@@ -4,19 +4,18 @@
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sequence {
     rows: Vec<usize>,
-    /// Of each row.
+    /// Place of each row by time.
     places: Vec<usize>,
 }
 
-/// Of all steps from row to row so many, one in ten, go back in time where rows are in no order of time: clocks that were set anew do so
-/// a few times.
+/// Rows are in no order of time where more than one step in so many goes back in time: clocks that were set anew do so a few times.
 const BACK: usize = 10;
 /// Fewer steps back are those of a file of one target after the other, where by time so many fewer stops are made.
 const STOPS: f64 = 0.7;
 
 impl Sequence {
-    /// Of rows whose `time` (s, of each) is far from their order; none where they follow each other, or two recordings do whose clocks
-    /// begin anew. `near` says whether two rows are of one pose.
+    /// The order of rows whose `time` (s, of each) is far from their order in the file; none where they follow each other, or two
+    /// recordings do whose clocks begin anew. `near` says whether two rows are of one pose.
     pub fn by_time(time: &[f64], near: impl Fn(usize, usize) -> bool) -> Option<Self> {
         let back = time.windows(2).filter(|pair| pair[1] < pair[0]).count();
         if back == 0 || time.iter().any(|time| !time.is_finite()) {

@@ -58,7 +58,7 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
     let still = |path: &str| {
         let mut bent = root.clone();
         let Some(place) = bent.at_mut(path) else { return false };
-        // Of the two, one is another value than what stands there.
+        // Null, or true in the place of null, is another value than what stands there.
         place.value = if matches!(place.value, YamlValue::Null) { YamlValue::Bool(true) } else { YamlValue::Null };
         T::deserialize(&bent).is_err_and(|other| other.clue == trouble.clue && other.message != trouble.message)
     };

@@ -17,7 +17,7 @@ pub(super) const BATCH: usize = 1 << 10;
 pub(super) struct Batches {
     /// Its columns, as the file declares them.
     pub schema: SchemaRef,
-    /// Of the file, bytes.
+    /// Size of the file, bytes.
     pub size: u64,
     /// Rows of the file, where it says so.
     pub rows: Option<u64>,

@@ -30,11 +30,11 @@ pub(super) struct Binding {
     pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub measures: bool,
-    /// Of the kinds of measurement those of which the file has something.
+    /// The kinds of measurement of which the file has something.
     pub kinds: Vec<usize>,
     pub sequence: Option<usize>,
     pub cells: Vec<NumberBinding>,
-    /// Of a wide row the point of each target.
+    /// The point of each target of a wide row.
     pub points: Vec<(String, [NumberBinding; 3])>,
     /// Numbers that are the same in every row, SI.
     pub constants: Vec<(usize, f64)>,

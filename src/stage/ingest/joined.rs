@@ -86,7 +86,7 @@ impl JoinDecisions<'_> {
         let later = self.moment(point, row, decision)? - self.moment(moving, row, decision)?;
         Some(later).filter(|later| later.is_finite())
     }
-    /// Of a wide row of file `index`, or of its partner, the targets that were seen: which, from 1, by name, where. None of other rows.
+    /// The targets that were seen in a wide row of file `index`, or in its partner: which, from 1, by name, where. None for other rows.
     pub(super) fn points(
         &self,
         index: usize,

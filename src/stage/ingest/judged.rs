@@ -12,10 +12,10 @@ use std::iter::repeat_n;
 #[derive(Default)]
 pub(super) struct JudgedRows {
     rows: Vec<KeptRow>,
-    /// Of each row, those that the file fills.
+    /// The numbers of each row that the file fills.
     values: Vec<f64>,
     points: Vec<[f64; 3]>,
-    /// Of each row its id, then the texts that the file has.
+    /// The id of each row, then its texts that the file has.
     texts: String,
     ends: Vec<usize>,
     /// The rows as they stand in the file.
@@ -24,7 +24,7 @@ pub(super) struct JudgedRows {
     rarities: VecDeque<Rarities>,
     /// How many were given back.
     given: usize,
-    /// Of the file up to the last of them.
+    /// Lines and bytes of the file up to the last of these rows.
     pub lines: u64,
     pub bytes: u64,
 }

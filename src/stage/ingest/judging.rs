@@ -47,7 +47,7 @@ struct JudgingThread {
 }
 
 impl JudgedFile {
-    /// Of a file below its header; `first` is its first row, where that was read to see how wide rows are.
+    /// The rows of a file below its header; `first` is its first row, where that was read to see how wide rows are.
     pub(super) fn new(reader: Block, first: Option<RecordFields>, judge: RowReader) -> Self {
         let mut rows = JudgedRows::default();
         (rows.lines, rows.bytes) = (reader.lines(), reader.bytes());

@@ -99,7 +99,7 @@ pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
 pub(super) struct Continuation {
     last: Option<i64>,
     latest: f64,
-    /// Of a later measurement before its first row, what its first row comes after the last one by, s.
+    /// Gap before a later measurement, s, until its first row is there; none where its clock is that of the rows before.
     begun: Option<Option<f64>>,
     sequence_by: i64,
     time_by: f64,

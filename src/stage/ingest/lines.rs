@@ -236,7 +236,7 @@ impl<R: TextBytes> RecordReader for TextReader<R> {
 
 /// Where text comes from: a file, or a block of one.
 pub(super) trait TextBytes: BufRead + Send {
-    /// Of a block, where its bytes are held.
+    /// The buffer that holds the bytes of a block; empty for a file.
     fn room(self) -> Vec<u8>
     where
         Self: Sized,

@@ -15,7 +15,7 @@ const KRL: [&str; 12] = ["A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "
 
 /// The table that a program lists; its joints are in deg.
 pub struct ListedTable {
-    /// Of the joints, as columns.
+    /// Names of the columns: `name`, then the axes.
     pub names: Vec<&'static str>,
     /// With the line at which each stands.
     pub rows: Vec<(u64, Vec<String>)>,

@@ -191,11 +191,11 @@ pub struct JointColumns {
     /// 1 or -1 for each joint: -1 where the file counts the other way than the robot file, e.g. `[1, 1, -1, 1, 1, 1]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sign: Vec<f64>,
-    /// Of positions: what the file shows where the robot file has its zero, for each joint in the unit of the column, e.g.
+    /// What the file shows where the robot file has its zero; for positions alone, for each joint in the unit of the column, e.g.
     /// `[0, -90, 0, 0, 0, 0]`. A position is `sign * (file - zero)`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero: Vec<f64>,
-    /// Of positions: angles that hold a part of another one, as where a controller reports joint 3 against the horizon; taken off.
+    /// Positions that hold a part of another joint's, as where a controller reports joint 3 against the horizon; the part is taken off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coupled: Vec<CoupledColumn>,
     /// The columns may be missing from the file, and their cells may be blank.

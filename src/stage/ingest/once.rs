@@ -100,7 +100,7 @@ struct Ahead<'a, 'b> {
     arm: &'b Arc<RobotJoints>,
     leading: usize,
     scans: Vec<Scan>,
-    /// Of the file that is read: partners as far as it was read.
+    /// The decision on the file that is read: partners as far as it was read.
     decision: FileDecision,
     names: Vec<String>,
     chunks: Option<RecordingChunks<'a>>,

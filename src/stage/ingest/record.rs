@@ -108,7 +108,7 @@ const HELD: usize = 1 << 11;
 pub(super) struct HeldRecords {
     label: String,
     records: VecDeque<RecordFields>,
-    /// Of the file up to the last of them.
+    /// Lines and bytes of the file up to the last of these rows.
     lines: u64,
     bytes: u64,
 }

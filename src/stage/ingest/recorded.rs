@@ -18,7 +18,7 @@ pub(super) struct RecordedRow {
     pub sequence: Option<i64>,
     /// SI, by the places of the arm's slots; NaN where missing.
     pub values: Vec<f64>,
-    /// Of a wide row the point of each target, SI; NaN where it was not seen.
+    /// The point of each target of a wide row, SI; NaN where it was not seen.
     pub points: Vec<[f64; 3]>,
     /// The first joint beyond its limits, from 0.
     pub beyond: Option<usize>,

@@ -27,7 +27,7 @@ pub(super) struct RowReader {
     pub limits: LimitPolicy,
     pub arm: Arc<RobotJoints>,
     pub asked: Fingerprints,
-    /// Of the last usable row.
+    /// Sequence number of the last usable row.
     last_sequence: Option<i64>,
     clock: ClockColumn,
     hasher: RowHasher,

@@ -56,7 +56,7 @@ pub(super) struct PackedRows {
     pub ids: Vec<String>,
     /// By [`Slots::texts`](super::slots::Slots::texts); none of those that the file does not have.
     pub texts: Vec<Option<Vec<String>>>,
-    /// Of wide rows the points of so many targets each.
+    /// The points of wide rows, of so many targets each.
     pub points: Vec<[f64; 3]>,
     pub targets: usize,
 }

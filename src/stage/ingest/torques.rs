@@ -45,7 +45,7 @@ pub enum TorqueSide {
     /// What moves the link.
     #[default]
     Joint,
-    /// Of the motor: times the reduction ratio it is the joint's.
+    /// The torque of the motor: times the reduction ratio it is the joint's.
     Motor,
 }
 

@@ -14,7 +14,7 @@ pub(super) struct VisitedCells {
 }
 
 impl VisitedCells {
-    /// Of some rows.
+    /// The cells that some rows lie in.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         let joint = |joint: usize| {
             let range = rows.iter().map(|row| data.q(*row)[joint]);

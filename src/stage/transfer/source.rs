@@ -16,7 +16,7 @@ pub(super) struct CarriedFrom<'a> {
 }
 
 impl<'a> CarriedFrom<'a> {
-    /// Of the carried model; none where the tables do not tell.
+    /// The recording of the carried model; none where the tables do not tell.
     pub fn of(reads: &'a TransferReads) -> Option<Self> {
         let own = reads.models.iter().rfind(|model| model.table == reads.parameters)?;
         Self::of_stage(reads, &own.stage)

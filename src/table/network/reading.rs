@@ -98,7 +98,7 @@ fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Netw
         joints = Some(JointMotion { arm, scales });
     }
     let outputs = joints.as_ref().map_or(OUTPUTS, |motion: &JointMotion| motion.scales.len());
-    // Of the biases of the hidden layer and of the outputs, the first member's.
+    // The first member's biases are those of the hidden layer and of the outputs.
     let hidden = numbers.first_member("bias").saturating_sub(outputs);
     let shape = LayerSizes { inputs, hidden, outputs, activation };
     let member = |member: usize| -> Result<Vec<f64>> {

@@ -33,9 +33,9 @@ pub struct Case {
     pub content: Content,
     /// The list that its effects are drawn from.
     pub collection: Collection,
-    /// Of this case.
+    /// The seed of this case.
     pub seed: u64,
-    /// Of the robot.
+    /// Kind of the robot.
     pub kind: Kind,
     /// As its owner believes it to be.
     pub robot: RobotDescription,

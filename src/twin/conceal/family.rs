@@ -115,7 +115,7 @@ pub enum Form {
 pub struct Bench<'a> {
     /// As its owner believes it to be.
     pub robot: &'a RobotDescription,
-    /// Of every joint, deg.
+    /// Ranges of every joint, deg.
     pub ranges_deg: &'a [[f64; 2]],
     /// Largest torque on each joint over the points, Nm.
     pub peak: Vec<f64>,

@@ -12,7 +12,7 @@ effect! {
         pub um_per_m_k: f64,
         /// Temperature at which the link has its length, C.
         pub reference_c: f64,
-        /// Of the cosine of the next joint.
+        /// Power of the cosine of the next joint.
         pub power: i32,
     }
     "unknown" at link ".bow", scaled by um_per_m_k, |self| [("expansion", "um/m/K", self.um_per_m_k)]

@@ -10,7 +10,7 @@ use calib_foundation::units::Unit;
 pub struct Interval {
     /// Canonical name of the effect.
     pub effect: String,
-    /// Of the number.
+    /// Name of the number.
     pub name: String,
     /// Whether it holds the truth.
     pub holds: bool,

@@ -17,7 +17,7 @@ const CONTENT: [&str; 2] = ["explained", "nothing_missing"];
 /// A recording that was diagnosed without its causes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// Of the recording.
+    /// Name of the recording.
     pub name: String,
     /// What was left out.
     pub effect: String,
@@ -80,7 +80,7 @@ pub struct LeftOutShares {
 }
 
 impl LeftOutShares {
-    /// Of recordings of L from [`DUE`] on in which the data can tell, or cannot.
+    /// Shares over recordings of L from [`DUE`] on in which the data can tell, or cannot.
     pub fn of(all: &[LeftOut], tells: bool) -> LeftOutShares {
         let own = || all.iter().filter(|one| one.strength >= DUE && one.tells == tells);
         let stated = |one: &LeftOut, least: f64| one.wrong.as_ref().is_some_and(|(_, probability)| *probability >= least);

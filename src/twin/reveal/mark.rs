@@ -60,7 +60,7 @@ pub struct Marked {
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOut {
-    /// Of the base model.
+    /// Error of the base model.
     pub before: f64,
     /// With the findings.
     pub after: f64,
@@ -84,11 +84,11 @@ impl HeldOut {
 /// A marked case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
-    /// Of the recording.
+    /// Name of the recording.
     pub name: String,
     /// What it conceals: null, single, pair or open.
     pub content: String,
-    /// Of its effect.
+    /// Family of its effect.
     pub family: String,
     /// Its kind.
     pub robot: String,
@@ -104,7 +104,7 @@ pub struct Case {
     pub strays: Vec<String>,
     /// Where points were held out.
     pub held_out: Option<HeldOut>,
-    /// Of the numbers that were stated.
+    /// Intervals of the numbers that were stated.
     pub intervals: Vec<Interval>,
     /// With a probability.
     pub statements: Vec<Statement>,

@@ -16,7 +16,7 @@ pub struct Name {
 /// A true number.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Number {
-    /// Of the parameter.
+    /// Name of the parameter.
     pub name: String,
     /// In `unit`.
     pub value: f64,
@@ -86,7 +86,7 @@ pub struct Truth {
     pub case: String,
     /// `null`, `single`, `pair`, `open`.
     pub content: String,
-    /// Of its effect.
+    /// Family of its effect.
     pub family: String,
     /// Its kind.
     pub robot: String,
@@ -131,7 +131,7 @@ pub struct Finding {
     /// That it is this effect at this place, and that it acts at this place.
     #[serde(default)]
     pub probability: Option<f64>,
-    /// Of the place.
+    /// Probability of the place.
     #[serde(default)]
     pub place_probability: Option<f64>,
 }
@@ -144,7 +144,7 @@ pub struct Rival {
     /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
-    /// Of this rival.
+    /// Probability of this rival.
     #[serde(default)]
     pub probability: Option<f64>,
 }
@@ -154,7 +154,7 @@ pub struct Rival {
 pub struct Answer {
     /// As it was given.
     pub verdict: String,
-    /// Of the base model.
+    /// Errors of the base model.
     #[serde(default)]
     pub before: Option<Errors>,
     /// With the findings.

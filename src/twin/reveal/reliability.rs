@@ -81,7 +81,7 @@ pub struct Reliability {
     pub auc: Option<f64>,
 }
 
-/// Of statements of one subject.
+/// The reliability of statements of one subject.
 pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, subject: Subject) -> Reliability {
     let all: Vec<&Statement> = statements.filter(|statement| statement.subject == subject).collect();
     let ends = ENDS.iter().zip(ENDS[1..].iter().chain([&1.0]));
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(shown, [(0.0, 0, 1), (0.8, 2, 3), (0.95, 1, 1)]);
         // 2 x 0.15^2 + 0.85^2 + 0 + 0.05^2, by five.
         assert!((brier.expect("a score") - 0.154).abs() < 1e-12);
-        // Of three right and two wrong: 1.0 is above both, each 0.85 above one and level with the other.
+        // Three are right and two wrong: 1.0 is above both wrong ones, each 0.85 above one and level with the other.
         assert!((auc.expect("an area") - 5.0 / 6.0).abs() < 1e-12);
         assert!(reliability(all.iter(), Subject::Place).bins.is_empty());
     }

@@ -5,7 +5,7 @@
 pub struct Share {
     /// So many.
     pub count: usize,
-    /// Of so many.
+    /// How many there are in all.
     pub of: usize,
 }
 

@@ -57,7 +57,7 @@ impl TorqueContent {
 }
 
 impl TorqueDesign {
-    /// Of the recording of this number: shares are kept by multiples of the golden ratio, whose order says nothing.
+    /// The content of the recording of this number: shares are kept by multiples of the golden ratio, whose order says nothing.
     fn content(&self, number: usize) -> TorqueContent {
         let begin = Noise::new(self.seed, Purpose::Design).uniform(0.0, 1.0);
         let at = (begin + number as f64 * 0.618_033_988_749_895).fract();
@@ -88,7 +88,7 @@ impl TorqueDesign {
 pub struct TorqueCase {
     /// `torque_017`.
     pub name: String,
-    /// Of this recording.
+    /// The seed of this recording.
     pub seed: u64,
     /// The arm as its user believes it to be.
     pub robot: RobotDescription,
@@ -117,7 +117,7 @@ pub struct TorqueCase {
 
 /// Arms that torques are recorded of.
 const ARMS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
-/// Of the rated payload.
+/// Payload that is carried, least and most, as a share of the rated one.
 const CARRIED: [f64; 2] = [0.2, 0.6];
 /// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
 const STRETCHES: [f64; 4] = [0.3, 0.25, 0.25, 0.2];

@@ -14,9 +14,9 @@ pub enum Fall {
 /// What bends before a joint slides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bristles {
-    /// Of one travel, which give way more and more.
+    /// Bristles of one travel, which give way more and more.
     One,
-    /// Of two travels in parallel.
+    /// Bristles of two travels in parallel.
     Two,
     /// Springs of three travels that hold until they slip.
     Slipping,
@@ -33,7 +33,7 @@ pub enum Law {
     Asymmetric { joint: usize, size: f64, width: f64, by_speed: f64 },
     /// Nm more at creeping speed, gone beyond `speed`, rad/s.
     Stribeck { joint: usize, size: f64, speed: f64, fall: Fall },
-    /// Of Coulomb friction: bristles that bend over a travel (rad).
+    /// Change of Coulomb friction by bristles that bend over a travel (rad); Nm.
     Presliding { joint: usize, size: f64, travel: f64, width: f64, bristles: Bristles },
     /// Friction as a share of what the gear transmits.
     Load { joint: usize, share: f64, exponent: f64, width: f64 },

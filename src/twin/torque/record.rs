@@ -9,7 +9,7 @@ use crate::noise::{Noise, Purpose};
 const FINE: f64 = 500.0;
 /// s between two stretches, in which nothing is recorded.
 const PAUSE: f64 = 2.0;
-/// Of the lasting part of noise, from row to row.
+/// Correlation of the lasting part of noise, from row to row.
 pub(super) const AR1_COEFFICIENT: f64 = 0.95;
 
 /// Rows of a recording, without noise or with it; per-joint lists are row-major.

@@ -36,7 +36,7 @@ struct Columns<'a> {
 }
 
 impl TorqueCase {
-    /// Of each law; `rows` are those with all of them. Other names are looked for of those beside the friction of all joints alone.
+    /// How visible each law is; `rows` are those with all of them. No other names are looked for of the friction of all joints.
     pub(super) fn visible(&self, rows: &TorqueRows) -> Vec<Visible> {
         let all: Vec<usize> = (0..self.laws.len()).collect();
         let columns = Columns::new(self, rows);
@@ -89,7 +89,7 @@ impl<'a> Columns<'a> {
         Self { case, rows, weight: weight.collect(), stated }
     }
 
-    /// Of torques in all rows.
+    /// The column of torques in all rows.
     fn of(&self, torque: impl Iterator<Item = f64>) -> Vec<f64> {
         let n = self.weight.len();
         let torque: Vec<f64> = torque.collect();

@@ -18,7 +18,7 @@ pub(super) struct NamedVariable {
 }
 
 impl NamedVariable {
-    /// Of a law at a joint; `None` of one that has no name in formulas. `slides`: which joints do not turn.
+    /// The variable of a law at a joint; `None` if it has no name in formulas or never varies. `slides`: which joints do not turn.
     pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2], slides: impl Fn(usize) -> bool) -> Option<Self> {
         let name = variable.in_formulas(joint)?;
         let is_prismatic = matches!(variable, Variable::Angle { joint } if slides(joint));

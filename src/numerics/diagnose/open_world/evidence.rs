@@ -23,7 +23,7 @@ pub(super) struct GroupEvidence {
 }
 
 impl GroupEvidence {
-    /// Of a group that the data do not see.
+    /// The evidence of a group that the data do not see.
     const NONE: Self = Self { log: 0.0, amplitude: SMALLEST };
 
     /// Whether the amplitude is none that a group of an arm can have.

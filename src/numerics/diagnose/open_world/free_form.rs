@@ -190,7 +190,7 @@ impl PlaceGroups {
             }
             log = self.exchanged((g, log), near, columns, beside).unwrap_or(log);
         }
-        // Of equal ones the plainer; most curves have no jumps.
+        // The plainer of two shapes that say as much is kept; most curves have no jumps.
         let finer = columns.finer(&self.groups[g].group).into_iter().collect();
         log = self.exchanged((g, log + *PAYS), finer, columns, beside).unwrap_or(log);
         let knotted = with_knots(&self.groups[g].group, beside.state, columns);

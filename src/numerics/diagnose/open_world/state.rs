@@ -34,7 +34,7 @@ pub(super) struct KnownCauses<'c> {
     picked: Vec<(usize, f64)>,
     /// Further columns times the roots of their prior variances; residual rows x count.
     more: DMatrix<f64>,
-    /// Of all of its columns times the roots of their prior variances, the picked ones first.
+    /// Products of all of its columns times the roots of their prior variances, the picked ones first.
     products: GroupProducts,
     /// Cholesky factor.
     lower: Mat<f64>,
@@ -54,7 +54,7 @@ pub(super) struct AskedGroup<'g> {
 }
 
 impl<'c> KnownCauses<'c> {
-    /// Of some of the model's causes and noise.
+    /// A state of some of the model's causes and noise.
     pub fn of(causes: &'c CauseColumns, picked: Vec<(usize, f64)>, scale: f64) -> Self {
         let (count, all) = (picked.len(), &causes.products);
         let among = |i: usize, j: usize| picked[i].1 * picked[j].1 * all.gram[(picked[i].0, picked[j].0)];

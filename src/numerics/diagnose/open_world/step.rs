@@ -13,7 +13,7 @@ pub(super) struct ModelStep {
     /// Causes that stay, by their positions.
     pub kept: Vec<usize>,
     pub new: Vec<Hypothesis>,
-    /// Of poses that a fit did not see.
+    /// Errors at poses that a fit did not see.
     pub folds: FoldErrors,
     /// What was done.
     pub sentence: String,

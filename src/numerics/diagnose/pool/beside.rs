@@ -82,7 +82,7 @@ impl<'p, 'a> Beside<'p, 'a> {
         }
     }
 
-    /// Of laws of the travel of one joint.
+    /// Gains of laws of the travel of one joint.
     fn gains_of_travels(&self, travels: &[(usize, Vec<f64>)]) -> Vec<f64> {
         let (joint, rows) = (travels[0].0, self.pool.problem.rows.len());
         let along = self.travels[joint].get_or_init(|| self.along(joint));
@@ -100,7 +100,7 @@ impl<'p, 'a> Beside<'p, 'a> {
         self.gains_by(both, [&along.base, &along.columns], &along.residual, counts)
     }
 
-    /// Of any forms.
+    /// Gains of any forms.
     fn gains_of_columns(&self, forms: &[Form]) -> Vec<f64> {
         let rows = self.pool.residual_rows;
         let (mut all, mut counts) = (Vec::new(), Vec::new());
@@ -117,7 +117,7 @@ impl<'p, 'a> Beside<'p, 'a> {
         self.gains_by([all, all], [&self.pool.base, &self.columns], &self.residual, counts.into_iter())
     }
 
-    /// Of columns of unit length, a form's after another's; products of two are those of `own` and `other`.
+    /// Gains by columns of unit length, a form's after another's; products of two are those of `own` and `other`.
     fn gains_by(
         &self,
         [own, other]: [MatRef<'_, f64>; 2],

@@ -13,8 +13,8 @@ pub(super) struct PivotedCholesky {
 }
 
 impl PivotedCholesky {
-    /// Of a q x q matrix, row by row; only its lower triangle is read. A column is computed when it is chosen: until then only what is left
-    /// on its diagonal is kept.
+    /// The factor of a q x q matrix, row by row; only its lower triangle is read. A column is computed when it is chosen: until then only
+    /// what is left on its diagonal is kept.
     pub fn of(gram: Vec<f64>, q: usize) -> Self {
         let mut order: Vec<usize> = (0..q).collect();
         let mut left: Vec<f64> = (0..q).map(|k| gram[k * (q + 1)]).collect();

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 /// The list of a round with its columns.
 pub(crate) struct EarlierPool {
     pub(super) rows: Vec<usize>,
-    /// Of each joint, rad/Nm.
+    /// Compliance of each joint, rad/Nm.
     pub(super) compliance: Vec<f64>,
     pub(super) columns: ListedColumns,
     /// As [`super::CachedHypotheses`] has them.

@@ -110,7 +110,7 @@ pub(crate) struct Fitter<'a> {
     pub correlated: Option<AutocorrelatedNoise>,
     /// How often that was learned.
     estimated: usize,
-    /// Of rows along a path.
+    /// Correlation of rows along a path.
     on_path: PathCorrelation,
 }
 

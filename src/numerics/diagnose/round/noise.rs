@@ -16,9 +16,9 @@ const STEPS: usize = 60;
 /// Covariances per squared deviation of every joint, by row.
 #[derive(Default)]
 pub(super) struct JointSpread {
-    /// Of the point, m2 per rad2.
+    /// Covariances of the point, m2 per rad2.
     points: Vec<Matrix3<f64>>,
-    /// Of what rows measured beside points, of the first three numbers of the kind; zero where a row measured none.
+    /// Covariances of what rows measured beside points, of the first three numbers of the kind; zero where a row measured none.
     others: Vec<(&'static dyn MeasurementKind, Vec<Matrix3<f64>>)>,
 }
 

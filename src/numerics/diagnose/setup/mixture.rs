@@ -23,7 +23,7 @@ pub(super) struct TwoSetups {
 }
 
 impl TwoSetups {
-    /// Of pairs and their one placement; none where two do not explain what it leaves.
+    /// The two set-ups of pairs, beside their one placement; none where two do not explain what it leaves.
     pub fn of(pairs: &PointPairs, one: &Placement) -> Option<Self> {
         let found = starts(pairs, one).into_iter().filter_map(|start| dealt(pairs, start, most(&one.off)));
         let best = found.min_by(|a, b| a.left.total_cmp(&b.left))?;

@@ -18,11 +18,11 @@ const RIDGE: f64 = 1e-9;
 /// Where robot and targets stand, and what is left.
 #[derive(Clone)]
 pub(super) struct Placement {
-    /// Of the base in the tracker's frame.
+    /// Pose of the base in the tracker's frame.
     base: Pose,
-    /// Of the targets at the zero pose, base frame, m.
+    /// Positions of the targets at the zero pose, base frame, m.
     seats: Vec<Vector3<f64>>,
-    /// Of the number that was asked for: m or rad.
+    /// Values of the number that was asked for: m or rad.
     pub values: Vec<f64>,
     /// Distance of each point, m.
     pub off: Vec<f64>,

@@ -22,7 +22,7 @@ impl SetupWords {
     }
 }
 
-/// Of a set-up error; `values` are those of its own number, `reach` is that of the robot file's arm, m.
+/// The words of a set-up error; `values` are those of its own number, `reach` is that of the robot file's arm, m.
 pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach: f64) -> SetupWords {
     let joints = robot.joints();
     let list = |of: &dyn Fn(usize) -> String| (0..joints).map(of).collect::<Vec<_>>().join(", ");
@@ -96,7 +96,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
     SetupWords::of(what, mend)
 }
 
-/// Of several set-up errors at once; joints that turn the other way have one list of signs.
+/// The words of several set-up errors at once; joints that turn the other way have one list of signs.
 pub(super) fn together(wrong: &[WrongSetup], robot: &RobotModel, words: impl Fn(WrongSetup) -> SetupWords) -> Vec<SetupWords> {
     let signs = |wrong: &WrongSetup| match wrong {
         WrongSetup::Sign(joint) => vec![*joint],

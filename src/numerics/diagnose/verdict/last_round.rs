@@ -14,7 +14,7 @@ pub(crate) struct LastRound<'a, 'b> {
     pub pool: &'b CachedHypotheses<'a>,
     pub survey: &'b Survey<'a>,
     pub judged: JudgedCauses,
-    /// Of every finding, that it is none of the list.
+    /// The odds of every finding that it is none of the list.
     pub odds: BTreeMap<FindingKey, NameOdds>,
     /// What errors of rows are compared and told in.
     pub scale: ErrorScale,

@@ -28,13 +28,13 @@ pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
     finding.probabilities = Probabilities { name: (1.0 - odds.none) / whole, place: odds.place, none: odds.none };
 }
 
-/// Of a rival beside a name whose weight is 1; only identities differ by nothing at all.
+/// The weight of a rival beside a name whose weight is 1; only identities differ by nothing at all.
 fn weight(rival: &RivalCause) -> f64 {
     let loss = if rival.delta_bic == 0.0 { *IDENTITY } else { rival.delta_bic.max(0.0) };
     (-loss / (2.0 * *TEMPERATURE)).exp()
 }
 
-/// Of a finding without a name: rivals share what free forms and a rejected name leave.
+/// Sets the probabilities of a finding without a name: rivals share what free forms and a rejected name leave.
 fn weigh_nameless(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
     let whole = f64::from(u8::from(rejected)) + finding.rivals.iter().map(weight).sum::<f64>();
     // No law of the list does as well: what is left is that evidence misleads.

@@ -37,7 +37,7 @@ impl AutocorrelatedNoise {
         self.share * (1.0 + self.correlation) / (1.0 - self.correlation)
     }
 
-    /// Of columns with `width` numbers for each of these rows of the recording, ascending.
+    /// The filter of columns with `width` numbers for each of these rows of the recording, ascending.
     pub fn filter(&self, rows: &[usize], width: usize) -> Innovations {
         let mut variance = self.share;
         let mut steps = Vec::with_capacity(rows.len());

@@ -26,7 +26,7 @@ pub(crate) struct Currents {
 const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
 
 impl Currents {
-    /// Of `rows` seen as `motions`; `None` where no current is usable.
+    /// The usable motors at `rows` seen as `motions`; `None` where no current is usable.
     pub fn new(robot: &RobotModel, data: &Measurements, rows: &[usize], motions: &[PointMotion]) -> Option<Self> {
         let mut usable: Vec<(usize, Vec<f64>, f64)> = Vec::new();
         for joint in (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)) {

@@ -45,7 +45,7 @@ pub(crate) struct WhitenedProblem<'a> {
 }
 
 impl<'a> WhitenedProblem<'a> {
-    /// Of what rows measured, without the motor currents.
+    /// The problem of what rows measured, without the motor currents.
     pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
         let kinds = kinds(data);
         let turns = kinds.iter().any(|kind| kind.about().rank.rotations);
@@ -184,7 +184,7 @@ impl<'a> WhitenedProblem<'a> {
         }
     }
 
-    /// Of any form, from its own partial derivatives.
+    /// The same of any form, from its own partial derivatives.
     fn motions_by_partials(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];

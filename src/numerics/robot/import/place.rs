@@ -58,7 +58,7 @@ enum Content<'a> {
 pub(super) struct DocumentNode<'a> {
     content: Content<'a>,
     path: String,
-    /// Of the nearest value that is there.
+    /// Place in the file of the nearest value that is there.
     mark: Mark,
     faults: &'a Faults<'a>,
 }
