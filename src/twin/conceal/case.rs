@@ -71,9 +71,8 @@ pub struct Case {
     pub fit: usize,
     /// Root mean square of a coordinate's noise at the points to fit and at those held out, mm.
     pub noise_mm: [f64; 2],
-    /// Root mean square of a coordinate at the points held out by which shapes drawn over time or temperature are off their edge values
-    /// at the points to fit, mm.
-    pub beyond_mm: f64,
+    /// Root mean square of a coordinate that foreign effects do at the points held out beyond what the points to fit show of them, mm.
+    pub unseen_mm: f64,
     /// Numbers that geometry, ratios, couplings and the tracker's pose amount to.
     pub geometry_rank: usize,
 }
@@ -116,7 +115,7 @@ impl Case {
         let (friction, motors) = drives(&robot, &bench, &mut draw);
         let acting = concealed.iter().flat_map(|one| one.cause.physical.clone());
         let effects: Vec<Physical> = acting.chain(friction.iter().cloned()).collect();
-        let beyond_mm = 1e3 * Site { points: &points, ..site }.beyond(fit, &effects);
+        let unseen_mm = 1e3 * Site { points: &points, ..site }.unseen(fit, &effects);
         let play = vec![play_rad / ARCSEC; robot.joints.len()];
         let poses = Poses::default();
         let experiment = Experiment {
@@ -163,7 +162,7 @@ impl Case {
             thermometer_c,
             fit,
             noise_mm,
-            beyond_mm,
+            unseen_mm,
         })
     }
 

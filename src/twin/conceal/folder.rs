@@ -68,7 +68,7 @@ impl Case {
             "noise": {
                 "fit_rms_per_axis_mm": self.noise_mm[0],
                 "validate_rms_per_axis_mm": self.noise_mm[1],
-                "beyond_fitted_rms_per_axis_mm": self.beyond_mm,
+                "unseen_rms_per_axis_mm": self.unseen_mm,
                 "joint_repeatability_rad": self.play_rad,
                 "scatter": self.tracker.scatter,
             },

@@ -3,7 +3,7 @@
 
 use crate::arm::Arm;
 use crate::effect::{self, Physical};
-use crate::equilibrium::{settle, sighted};
+use crate::equilibrium::{Equilibrium, settle, sighted};
 use crate::matrix;
 use crate::memory;
 use crate::motion::Motion;
@@ -42,13 +42,12 @@ impl Site<'_> {
         rows.collect()
     }
 
-    /// What the tracker sees with effects, less what it would see without them of the joints as logged.
-    pub fn displacement(&self, effects: &[Physical]) -> Column {
+    /// Every row with the arm as it rests there under effects.
+    fn at_rest<'s>(&'s self, effects: &'s [Physical]) -> impl Iterator<Item = (Row, Equilibrium)> + 's {
         let mut arm = Arm::new(self.robot, self.truth);
         effects.iter().for_each(|effect| effect.shape(&mut arm));
-        let base = self.tracker.base();
         let memories = effect::recall(effects, &memory::past(self.points));
-        let seen = self.points.iter().zip(memories).flat_map(|(point, memory)| {
+        self.points.iter().zip(memories).map(move |(point, memory)| {
             let row = Row {
                 command: point.q.clone(),
                 drive: self.truth.drive(self.robot, &point.q),
@@ -60,31 +59,44 @@ impl Site<'_> {
                 memory,
             };
             let rest = settle(&arm, &row, effects);
-            sighted(&rest, &base, &row, effects)
-        });
+            (row, rest)
+        })
+    }
+
+    /// What the tracker sees with effects, less what it would see without them of the joints as logged.
+    pub fn displacement(&self, effects: &[Physical]) -> Column {
+        let base = self.tracker.base();
+        let seen = self.at_rest(effects).flat_map(|(row, rest)| sighted(&rest, &base, &row, effects));
         let bare = self.bare(self.truth, self.tracker, effects);
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
     }
 
-    /// What a foreign effect does at the points after the first `fit` ones beyond what it does there when it holds the edge values of the
-    /// times and temperatures of these: root mean square of a coordinate, m.
-    pub fn beyond(&self, fit: usize, effects: &[Physical]) -> f64 {
-        let fitted = &self.points[..fit.min(self.points.len())];
-        let range = |of: fn(&Point) -> f64| {
-            let values = fitted.iter().map(of);
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
-        };
-        let (times, temperatures) = (range(|point| point.time_s), range(|point| point.temperature_c));
-        let held = |effect: &Physical| match effect {
-            Physical::Foreign(foreign) => Physical::Foreign(foreign.held(times, temperatures)),
-            other => other.clone(),
-        };
-        let held: Vec<Physical> = effects.iter().map(held).collect();
-        if held == effects {
+    /// What foreign effects do at the points after the first `fit` ones beyond what these show of them, root mean square of a coordinate, m:
+    /// the effects less the same known without noise at the points to fit, and straight between them.
+    pub fn unseen(&self, fit: usize, effects: &[Physical]) -> f64 {
+        let is_foreign = |effect: &Physical| matches!(effect, Physical::Foreign(_));
+        if !effects.iter().any(is_foreign) {
             return 0.0;
         }
-        let [all, held] = [effects, &held].map(|effects| self.displacement(effects));
-        let judged: Vec<f64> = all.iter().zip(&held).skip(3 * fitted.len()).map(|(all, held)| all - held).collect();
+        let mut seen: Vec<Vec<Vec<f64>>> = vec![Vec::new(); effects.len()];
+        let base = self.tracker.base();
+        for (row, rest) in self.at_rest(effects).take(fit) {
+            let there = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            for (index, effect) in effects.iter().enumerate() {
+                if let Physical::Foreign(foreign) = effect {
+                    let memory = row.memory.get(index).copied().unwrap_or(0.0);
+                    let point = if foreign.is_sighted() { there } else { rest.posture.tool };
+                    seen[index].push(foreign.values(&row, memory, &rest.torque, point));
+                }
+            }
+        }
+        let known = |(effect, values): (&Physical, &Vec<Vec<f64>>)| match effect {
+            Physical::Foreign(foreign) => Physical::Foreign(foreign.known_at(values)),
+            other => other.clone(),
+        };
+        let known: Vec<Physical> = effects.iter().zip(&seen).map(known).collect();
+        let [all, known] = [effects, &known].map(|effects| self.displacement(effects));
+        let judged: Vec<f64> = all.iter().zip(&known).skip(3 * fit).map(|(all, known)| all - known).collect();
         norm(&judged) / (judged.len().max(1) as f64).sqrt()
     }
 

@@ -75,15 +75,17 @@ pub struct ForeignCourse {
 }
 
 impl ForeignCourse {
-    /// The same with the edge value of a range beyond it.
-    fn held(&self, seen: [f64; 2]) -> Self {
+    /// Where a value of the variable lies on the way, 0 to 1.
+    fn way(&self, value: f64) -> f64 {
         let [from, to] = self.between;
-        let between = [seen[0].max(from), seen[1].min(to)];
-        if between[1] - between[0] <= 1e-9 * (to - from) {
-            return self.clone();
-        }
-        let shape = self.shape.part(between.map(|value| (value - from) / (to - from)));
-        Self { over: self.over.clone(), between, shape }
+        ((value - from) / (to - from)).clamp(0.0, 1.0)
+    }
+
+    /// The same as straight lines between its values at some of its variable, with the edge value beyond them.
+    fn known_at(&self, values: impl Iterator<Item = f64>) -> Self {
+        let mut points: Vec<[f64; 2]> = values.map(|value| self.way(value)).map(|way| [way, self.shape.value(way)]).collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Self { over: self.over.clone(), shape: ForeignShape::Corners(points), ..*self }
     }
 }
 
@@ -92,26 +94,26 @@ fn first() -> usize {
 }
 
 impl Foreign {
-    /// The same as far as a range of times (s) and of temperatures (C) shows it: beyond them it holds its edge value.
-    pub fn held(&self, time_s: [f64; 2], temperature_c: [f64; 2]) -> Self {
-        let held = |course: &ForeignCourse| match course.over {
-            ForeignVariable::Time => course.held(time_s),
-            ForeignVariable::Temperature => course.held(temperature_c),
-            _ => course.clone(),
-        };
-        Self { courses: self.courses.iter().map(held).collect(), ..self.clone() }
+    /// The variables of its courses at a row, with which `torque` (Nm) and with the measured `point` (m) as the motion has it.
+    pub fn values(&self, row: &Row, memory: f64, torque: &[f64], point: Vector) -> Vec<f64> {
+        let seen = Seen { row, memory, torque, point };
+        self.courses.iter().map(|course| course.over.value(&seen)).collect()
+    }
+
+    /// The same as far as rows show it at which the variables of its courses have these values: straight lines between them.
+    pub fn known_at(&self, values: &[Vec<f64>]) -> Self {
+        let known = |(k, course): (usize, &ForeignCourse)| course.known_at(values.iter().map(|all| all[k]));
+        Self { courses: self.courses.iter().enumerate().map(known).collect(), ..self.clone() }
+    }
+
+    /// Whether it acts in what the instrument reads, and not on the arm.
+    pub fn is_sighted(&self) -> bool {
+        matches!(self.motion, ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation)
     }
 
     /// Product of the shapes in what is seen.
     fn share(&self, seen: &Seen) -> f64 {
-        self.courses
-            .iter()
-            .map(|course| {
-                let [from, to] = course.between;
-                let way = (course.over.value(seen) - from) / (to - from);
-                course.shape.value(way.clamp(0.0, 1.0))
-            })
-            .product()
+        self.courses.iter().map(|course| course.shape.value(course.way(course.over.value(seen)))).product()
     }
 
     fn shift(&self, share: f64) -> Vector {
@@ -190,5 +192,22 @@ impl Stated for Foreign {
             Azimuth | Elevation => ("tracker".into(), "arcsec"),
         };
         vec![true_value("unknown", "foreign", place, "size", unit, self.size)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rows_show_of_a_shape_is_exact_at_them_and_straight_between() {
+        let shape = ForeignShape::Jumps(vec![[0.2, 1.0], [0.55, -1.0]]);
+        let course = ForeignCourse { over: ForeignVariable::Time, between: [10.0, 20.0], shape };
+        let known = course.known_at([18.0, 11.0, 13.0].into_iter());
+        let at = |value: f64| known.shape.value(known.way(value));
+        let wanted = [(5.0, 0.0), (11.0, 0.0), (12.0, 0.5), (13.0, 1.0), (18.0, -1.0), (30.0, -1.0)];
+        for (value, wanted) in wanted {
+            assert!((at(value) - wanted).abs() < 1e-12, "at {value}: {}", at(value));
+        }
     }
 }

@@ -64,8 +64,8 @@ pub struct HeldOut {
     pub before: f64,
     /// With the findings.
     pub after: f64,
-    /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit; with it what shapes
-    /// do beyond the times and temperatures of the points to fit, which no model of these can know.
+    /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit; with it what foreign
+    /// effects do beyond what the points to fit show of them, which no model can know.
     pub bound: f64,
 }
 
@@ -204,6 +204,6 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
     let noise = truth.noise.as_ref()?;
     let square = noise.validate_rms_per_axis_mm.powi(2) * (1.0 + p / (n - p - 1.0).max(1.0));
-    let bound = (3.0 * (square + noise.beyond_fitted_rms_per_axis_mm.powi(2))).sqrt();
+    let bound = (3.0 * (square + noise.unseen_rms_per_axis_mm.powi(2))).sqrt();
     Some(HeldOut { before, after, bound })
 }

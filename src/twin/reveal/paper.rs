@@ -74,9 +74,9 @@ pub struct NoiseSize {
     pub fit_rms_per_axis_mm: f64,
     /// At the points to judge by.
     pub validate_rms_per_axis_mm: f64,
-    /// What shapes drawn over time or temperature do there beyond the edge values that the points to fit show.
+    /// What foreign effects do there beyond what the points to fit show of them.
     #[serde(default)]
-    pub beyond_fitted_rms_per_axis_mm: f64,
+    pub unseen_rms_per_axis_mm: f64,
 }
 
 /// The truth of a case; what it holds besides is not needed here.

@@ -111,7 +111,7 @@ impl Board {
             out,
             "\nplaces and names of effects with L of {DUE} or more\n  effect                     n  place  name or unknown  wrong name"
         );
-        for (effect, Places { place, name_or_unknown, wrong_name }) in by_effect {
+        for (effect, Places { place, name_or_unknown, wrong_name, .. }) in by_effect {
             let _ = writeln!(
                 out,
                 "  {effect:<22}{:>6}{:>7}{:>17}{:>12}",
@@ -185,7 +185,12 @@ impl Board {
             json!({ "which": title, "shares": shares.iter().map(|(what, of)| json!({ "what": what, "share": share(of) })).collect::<Vec<_>>() })
         });
         let places = |of: &Places| {
-            let each = [("place", of.place), ("name_or_unknown", of.name_or_unknown), ("wrong_name", of.wrong_name), ("wrong_name_0.5", of.wrong_given)];
+            let each = [
+                ("place", of.place),
+                ("name_or_unknown", of.name_or_unknown),
+                ("wrong_name", of.wrong_name),
+                ("wrong_name_0.5", of.wrong_given),
+            ];
             each.iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>()
         };
         let (placed, placed_by_effect) = self.places();
