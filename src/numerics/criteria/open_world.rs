@@ -15,6 +15,8 @@ criteria! {
     JUMPS: f64 = 10.0, "ln of evidence", "literature: twice very strong, Kass and Raftery (1995)", "";
     /// How often the number of a group's variable is halved in its step.
     LEVELS: i32 = 4, "levels", "judgement: bounds time", "";
+    /// The same at most, where a further level still pays.
+    FINEST_LEVEL: i32 = 9, "levels", "judgement: bounds time", "";
     /// Groups whose shorter lengths are looked at.
     CLOSER: usize = 10, "groups", "judgement: bounds time", "";
     /// Correlation lengths of smooth functions, shares of their variable's range.

@@ -2,11 +2,11 @@
 
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
 use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows};
-use super::groups::{FreeGroup, GroupColumns};
+use super::groups::{FreeGroup, GroupColumns, Memory};
 use super::knots::with_knots;
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
-use crate::criteria::open_world::{CLOSER, GROUPS, JUMPS, LEVELS, PAYS};
+use crate::criteria::open_world::{CLOSER, FINEST_LEVEL, GROUPS, JUMPS, LEVELS, PAYS};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -78,13 +78,14 @@ pub(super) struct AroundGroups<'f, 'a> {
     pub causes: &'f CauseColumns,
     /// Names that are taken out of the list.
     pub without: &'f [String],
+    pub memory: Memory,
 }
 
 impl PlaceGroups {
     /// All groups; without their columns unless these are to be `kept`: only a free form of several groups needs them, beside causes alone
     /// products say all.
     pub fn of(place: Place, around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame, around.survey);
+        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
         let all = columns.of(place);
         let mut out = Self { place, groups: Vec::new() };
         out.take(all, &mut columns, around, kept);
@@ -93,7 +94,7 @@ impl PlaceGroups {
 
     /// With the products of two variables that what some states leave points at.
     pub fn with_pairs(&self, states: &[&KnownCauses], around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame, around.survey);
+        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
         let mut out = self.clone();
         let new = pairs(self.place, states, around.frame, &mut columns, around.survey);
         out.take(new, &mut columns, around, kept);
@@ -183,18 +184,27 @@ impl PlaceGroups {
     /// Moves the numbers of a group's variables to where the evidence is largest, and gives it shorter waves, jumps or corners where these say
     /// more; returns the evidence of what stands there.
     fn shaped(&mut self, (g, mut log): (usize, f64), columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
-        for level in 0..*LEVELS {
-            let near = columns.near(&self.groups[g].group, level);
-            if near.is_empty() {
-                break;
-            }
-            log = self.exchanged((g, log), near, columns, beside).unwrap_or(log);
-        }
+        log = self.numbered((g, log), 0, columns, beside);
         // The plainer of two shapes that say as much is kept; most curves have no jumps.
         let finer = columns.finer(&self.groups[g].group).into_iter().collect();
-        log = self.exchanged((g, log + *PAYS), finer, columns, beside).unwrap_or(log);
+        if let Some(better) = self.exchanged((g, log + *PAYS), finer, columns, beside) {
+            log = self.numbered((g, better), 1, columns, beside);
+        }
         let knotted = with_knots(&self.groups[g].group, beside.state, columns);
         self.exchanged((g, log + *JUMPS), knotted, columns, beside).unwrap_or(log)
+    }
+
+    /// Moves the numbers of a group's variables to where the evidence is largest, closer with every level from one on; returns that evidence.
+    fn numbered(&mut self, (g, mut log): (usize, f64), from: i32, columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
+        for level in from..*FINEST_LEVEL {
+            let near = columns.near(&self.groups[g].group, level);
+            let better = self.exchanged((g, log), near, columns, beside);
+            if level + 1 >= *LEVELS && better.is_none_or(|better| better < log + *PAYS) {
+                break;
+            }
+            log = better.unwrap_or(log);
+        }
+        log
     }
 
     /// ln of the evidence of a group beside a state without the price of its place among others like it; none of an amplitude that no arm has.
@@ -244,7 +254,7 @@ impl PlaceGroups {
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
         let (mut now, mut terms): (_, Vec<FreeTerm>) = (state.clone(), Vec::new());
         let mut log = f64::NEG_INFINITY;
-        let mut columns = GroupColumns::new(around.frame, around.survey);
+        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
         for step in 0..*GROUPS {
             let scan = self.scan(&now);
             let paid = |g: usize| scan[g].0.log - self.price(g);

@@ -123,17 +123,27 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
     lengths.iter().copied().map(density).collect()
 }
 
+/// What is asked of the travel of joints that are not a place's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Memory {
+    /// Their last moves: of those that show, what else they leave behind.
+    LastMoves,
+    /// All that it may leave behind: where what is left is more than noise.
+    All,
+}
+
 /// Directions of motions and values of variables at every row, computed once.
 pub(super) struct GroupColumns<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
+    pub memory: Memory,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
 impl<'f, 'a> GroupColumns<'f, 'a> {
-    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>) -> Self {
-        Self { frame, survey, directions: Vec::new(), values: Vec::new() }
+    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>, memory: Memory) -> Self {
+        Self { frame, survey, memory, directions: Vec::new(), values: Vec::new() }
     }
 
     /// A variable at every row, where every row tells it.
@@ -221,7 +231,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     /// All groups of a place.
     pub fn of(&mut self, place: Place) -> Vec<FreeGroup> {
         let (mut out, survey) = (Vec::new(), self.survey);
-        for (motion, variables) in motions(place, survey) {
+        for (motion, variables) in motions(place, survey, self.memory) {
             for (of, count) in variables {
                 if let Some(basis) = self.basis(of, count) {
                     out.push(FreeGroup { motion, law: Law::new(of, basis), of: alike(of) });
@@ -244,11 +254,19 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             return Vec::new();
         }
         let of = group.law.first.of;
-        let all = motions(group.place(), self.survey);
+        let all = motions(group.place(), self.survey, self.memory);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
-        // What has a number of its own to be found is no second factor.
-        let single: Vec<Variable> = others.map(|(other, _)| other).filter(|other| *other != of && alike(*other) == 1).collect();
+        let others = others.map(|(other, _)| other).filter(|other| self.is_factor(*other));
+        let single: Vec<Variable> = others.filter(|other| !is_alike(*other, of)).collect();
         single.into_iter().filter_map(|other| self.product(group.motion, [of, other], group.of)).collect()
+    }
+
+    /// Whether a variable may be one of two: what a travel leaves behind where all memory is asked for.
+    pub fn is_factor(&self, of: Variable) -> bool {
+        match of {
+            Variable::Stretch { .. } | Variable::Recent { .. } => self.memory == Memory::All,
+            _ => alike(of) == 1,
+        }
     }
 
     /// The product of two variables, where the rows show one: neither follows the other.
@@ -266,6 +284,16 @@ pub(super) fn alike(of: Variable) -> usize {
         Variable::Stretch { .. } => LIMITS.len(),
         Variable::Recent { .. } => FADING.len(),
         _ => 1,
+    }
+}
+
+/// Whether two variables are the same but for a number of their own.
+pub(super) fn is_alike(one: Variable, other: Variable) -> bool {
+    match (one, other) {
+        (Variable::Stretch { joint: a, .. }, Variable::Stretch { joint: b, .. })
+        | (Variable::Recent { joint: a, .. }, Variable::Recent { joint: b, .. }) => a == b,
+        (Variable::Position { .. }, Variable::Position { .. }) | (Variable::Sighted { .. }, Variable::Sighted { .. }) => true,
+        _ => one == other,
     }
 }
 
@@ -293,7 +321,7 @@ fn length(survey: &Survey, link: usize) -> f64 {
 }
 
 /// The motions of a place, and what each may follow with how many cosines.
-pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
+pub(super) fn motions(place: Place, survey: &Survey, memory: Memory) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
     let angles =
         |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
@@ -305,7 +333,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
     };
     let moved = |joint: usize| {
         let own = moved(joint, survey).map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }));
-        own.chain(others(joint, survey))
+        own.chain(others(joint, survey, memory))
     };
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
@@ -335,7 +363,7 @@ pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variab
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
             let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
-            let moves = others(joints, survey);
+            let moves = others(joints, survey, memory);
             let own: Vec<_> =
                 sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(moves).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
@@ -364,9 +392,13 @@ pub(super) fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Varia
     sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }])
 }
 
-/// The last moves of the other joints: what else they leave behind is asked of those that show.
-fn others(joint: usize, survey: &Survey) -> impl Iterator<Item = (Variable, usize)> {
-    (0..survey.joints()).filter(move |other| *other != joint).map(|joint| (Variable::Move { joint }, *SKETCH))
+/// What the travel of the other joints leaves behind.
+fn others(joint: usize, survey: &Survey, memory: Memory) -> impl Iterator<Item = (Variable, usize)> {
+    let of = move |joint: usize| {
+        let all = moved(joint, survey).filter(move |of| memory == Memory::All || matches!(of, Variable::Move { .. }));
+        all.map(|of| (of, *SKETCH))
+    };
+    (0..survey.joints()).filter(move |other| *other != joint).flat_map(of)
 }
 
 /// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.

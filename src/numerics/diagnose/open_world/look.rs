@@ -2,13 +2,14 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{AroundGroups, FreeForm, FreeTerm, PlaceGroups, side_by_side};
+use super::groups::Memory;
 use super::names::{
     ContestedName, NameCase, NameOdds, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places,
     unit_variances,
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
+use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, STRUCTURED, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -62,27 +63,31 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     groups: Vec<PlaceGroups>,
     scale: f64,
     whole: KnownCauses<'l>,
+    /// Mean square of what the richest model leaves, over that of the noise that its statement and repeats show.
+    left: f64,
     beside: SurveyedPlaces,
     findings: FindingGroups,
 }
 
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
-    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
+    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, memory: Memory) -> Self {
         let without = sight.fitter.question.without;
-        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without };
+        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without, memory };
         let all = groups_of_places(&around);
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
+        let least = sight.fitter.least_of_the_noise();
         let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
-        let louder = louder.max(sight.fitter.least_of_the_noise());
-        if louder > *LOUDER || louder < 1.0 / *LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
+        let left = louder / least;
+        let louder = louder.max(least);
+        if louder > *LOUDER || louder < 1.0 / *LOUDER && least < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);
             beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         }
         let findings = groups(&sight.judged.state, &sight.judged.set, pool, survey);
-        Self { sight, pool, around, groups: all, scale, whole, beside, findings }
+        Self { sight, pool, around, groups: all, scale, whole, left, beside, findings }
     }
 
     fn case(&self) -> NameCase<'_, 'l, 'v, 'a> {
@@ -98,10 +103,33 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         ModelChange { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
     }
 
+    pub fn left(&self) -> f64 {
+        self.left
+    }
+    pub fn bests(&self) -> Vec<String> {
+        self.beside
+            .best
+            .iter()
+            .map(|f| {
+                format!(
+                    "{} {:.0} {:?}",
+                    f.place,
+                    f.log,
+                    f.terms.iter().map(|t| format!("{:.0} {}", t.log, t.group.hypothesis().form.key())).collect::<Vec<_>>()
+                )
+            })
+            .collect()
+    }
+    /// Whether more than noise is left.
+    pub fn leaves_structure(&self) -> bool {
+        self.left > *STRUCTURED
+    }
+
     /// The free form of one place instead of all causes, where it says more than they do together.
     pub fn alone(&self) -> Option<ModelStep> {
         let set = &self.sight.judged.set;
-        if self.findings.len() < 2 {
+        let least = if self.around.memory == Memory::All { 1 } else { 2 };
+        if self.findings.len() < least {
             return None;
         }
         let none = self.sight.state(&|_| false, self.scale);
@@ -109,7 +137,16 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let price: f64 = set.iter().map(|h| case.price(*h) - listed + *SIZE).sum();
-        let more = best.log + open - (self.whole.log() - price);
+        // What joins beside them counts for them.
+        let beside = self.beside.best.first().map_or(0.0, |form| (form.log + open).max(0.0));
+        let more = best.log + open - (self.whole.log() - price + beside);
+        eprintln!(
+            "DBG alone {} {:.0} more {more:.0} whole {:.0} price {price:.0} beside {beside:.0} {:?}",
+            best.place,
+            best.log,
+            self.whole.log(),
+            best.terms.iter().map(|t| format!("{:.0} {}", t.log, t.group.hypothesis().form.key())).collect::<Vec<_>>()
+        );
         let all: Vec<usize> = (0..set.len()).collect();
         let sentence = || format!("a free form at {} says more than all causes: {more:.0} nats of evidence", best.place);
         (more > *STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?

@@ -1,5 +1,6 @@
 //! What free forms add to a judged model, or put in the place of its names, as far as folds agree; and the odds of what stands.
 
+use super::groups::Memory;
 use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
@@ -31,7 +32,7 @@ pub(crate) fn settle(
 ) -> Settled {
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
-    let mut asked_alone = false;
+    let (mut asked_alone, mut memory) = (false, Memory::LastMoves);
     // What joined may leave nothing to a cause that was there before: that goes however late it is seen.
     let mut round = 0;
     loop {
@@ -40,7 +41,7 @@ pub(crate) fn settle(
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {
             let sight = Sighted::of(&view, &judged, fitter);
-            let look = OpenWorldLook::of(&sight, pool, survey);
+            let look = OpenWorldLook::of(&sight, pool, survey, memory);
             if round < *ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }
@@ -51,6 +52,31 @@ pub(crate) fn settle(
                 let contested = look.contested();
                 step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
+            }
+            eprintln!(
+                "DBG round {round} memory {memory:?} left {:.3} step {:?} refused {refused:?} best {:?}",
+                look.left(),
+                step.as_ref().map(|s| &s.sentence),
+                look.bests()
+            );
+            if let Some(s) = &step {
+                eprintln!(
+                    "DBG   causes {:?} folds {:.3e} rows {} excess {:.3e}",
+                    s.state
+                        .causes
+                        .iter()
+                        .map(|c| format!("{} {:?}", c.form.key(), c.form))
+                        .map(|t| t.chars().take(330).collect::<String>())
+                        .collect::<Vec<_>>(),
+                    s.folds.rms(),
+                    s.state.screening.kept.len(),
+                    s.state.fitted.excess_sigma
+                );
+            }
+            if step.is_none() && round < *ROUNDS && memory == Memory::LastMoves && look.leaves_structure() {
+                (memory, asked_alone) = (Memory::All, false);
+                refused.clear();
+                continue;
             }
         }
         let Some(ModelStep { state, kept, new, sentence, .. }) = step else { return Settled { judged, odds } };

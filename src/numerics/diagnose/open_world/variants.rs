@@ -2,7 +2,7 @@
 
 use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
 use crate::criteria::open_world::{EACH, FINE};
-use crate::effect::{Factor, Law, Variable};
+use crate::effect::{Basis, Factor, Law, Variable};
 use nalgebra::Vector3;
 
 impl GroupColumns<'_, '_> {
@@ -54,17 +54,22 @@ impl GroupColumns<'_, '_> {
         out
     }
 
-    /// A group with others in the place of each of its variables.
+    /// A group with others in the place of each of its variables, by no fewer functions.
     fn with_other_variables(&mut self, group: &FreeGroup, others: impl Fn(Variable) -> Vec<Variable>) -> Vec<FreeGroup> {
         let Law { first, times } = group.law;
-        let count = if times.is_some() { *EACH } else { *FINE };
+        let least = if times.is_some() { *EACH } else { *FINE };
         let mut laws = Vec::new();
-        let mut basis = |of: Variable| if times.is_some() { self.factor(of, count) } else { self.basis(of, count) };
+        let mut basis = |of: Variable, old: &Basis| {
+            let count = if let Basis::Cosines { count, .. } = *old { count.max(least) } else { least };
+            if times.is_some() { self.factor(of, count) } else { self.basis(of, count) }
+        };
         for of in others(first.of) {
-            laws.extend(basis(of).map(|basis| Law { first: Factor::new(of, basis), times }));
+            laws.extend(basis(of, &first.basis).map(|basis| Law { first: Factor::new(of, basis), times }));
         }
-        for of in times.map_or(Vec::new(), |times| others(times.of)) {
-            laws.extend(basis(of).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
+        if let Some(times) = times {
+            for of in others(times.of) {
+                laws.extend(basis(of, &times.basis).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
+            }
         }
         let of = |law: &Law| if times.is_some() { group.of } else { alike(law.first.of) };
         laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()

@@ -69,6 +69,8 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
     let folds = if lengths { cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed) } else { None };
+    // The same model as before is as good as before, by the noise that is known now.
+    let before = if state.causes.is_empty() { &misfit.sizes } else { before };
     let ground = Ground { partly_nameless, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
     Diagnosis {
         dimension: misfit.dimension,
