@@ -36,7 +36,10 @@ impl GroupColumns<'_, '_> {
                 Variable::Angle { joint } | Variable::Approach { joint } | Variable::Move { joint } => {
                     moved(joint, survey).collect()
                 }
-                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => moved(joint, survey).collect(),
+                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => {
+                    // What hardly ever slips follows the angle.
+                    moved(joint, survey).chain([Variable::Angle { joint }]).collect()
+                }
                 // By themselves these are asked at every place.
                 _ if group.law.times.is_some() && PASSING.contains(&of) => PASSING.to_vec(),
                 _ => Vec::new(),
