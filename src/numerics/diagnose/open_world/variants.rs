@@ -1,7 +1,7 @@
 //! Groups like one that shows: with other numbers of its variables, with variables that go along with these, with shorter waves.
 
 use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
-use crate::criteria::open_world::{EACH, FINE};
+use crate::criteria::open_world::{EACH, FINE, FINE_EACH};
 use crate::effect::{Basis, Factor, Law, Variable};
 use nalgebra::Vector3;
 
@@ -78,12 +78,9 @@ impl GroupColumns<'_, '_> {
         laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()
     }
 
-    /// A group with more and shorter waves; none of a product of two curves.
+    /// A group with more and shorter waves.
     pub fn finer(&mut self, group: &FreeGroup) -> Option<FreeGroup> {
-        if group.curves() > 1 {
-            return None;
-        }
-        let count = *FINE;
+        let count = if group.curves() > 1 { *FINE_EACH } else { *FINE };
         let two = group.law.times.is_some();
         let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
         let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
