@@ -166,17 +166,25 @@ impl PlaceGroups {
         let start = self.paid(g, beside.state);
         // The first group of a place decides which place it is.
         let relatives = if beside.terms.is_empty() { columns.relatives(&self.groups[g].group) } else { Vec::new() };
-        let mut log = self.shaped((g, start), columns, beside);
+        // Shapes of two curves take long: only the best of these gets its own.
+        let two = self.groups[g].group.curves() > 1;
+        let asked = |groups: &mut Self, at: (usize, f64), columns: &mut GroupColumns| {
+            if two { groups.numbered(at, 0, columns, beside) } else { groups.shaped(at, columns, beside) }
+        };
+        let mut log = asked(self, (g, start), columns);
         for alike in relatives {
             let first = self.groups.len();
             self.groups.push(self.groups[g].clone());
             let begun = self.exchanged((first, f64::NEG_INFINITY), alike, columns, beside);
-            let other = self.shaped((first, begun.unwrap_or(f64::NEG_INFINITY)), columns, beside);
+            let other = asked(self, (first, begun.unwrap_or(f64::NEG_INFINITY)), columns);
             if other > log {
                 log = other;
                 self.groups.swap(g, first);
             }
             self.groups.truncate(first);
+        }
+        if two {
+            log = self.shaped((g, log), columns, beside);
         }
         log - start
     }
@@ -185,12 +193,13 @@ impl PlaceGroups {
     /// more; returns the evidence of what stands there.
     fn shaped(&mut self, (g, mut log): (usize, f64), columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
         log = self.numbered((g, log), 0, columns, beside);
-        // The plainer of two shapes that say as much is kept; most curves have no jumps.
+        let knotted = with_knots(&self.groups[g].group, beside.state, columns);
+        // The plainer of two shapes that say as much is kept; most curves have no jumps, and finer ones of two have very many numbers.
         let finer = columns.finer(&self.groups[g].group).into_iter().collect();
-        if let Some(better) = self.exchanged((g, log + *PAYS), finer, columns, beside) {
+        let least = if self.groups[g].group.curves() > 1 { *JUMPS } else { *PAYS };
+        if let Some(better) = self.exchanged((g, log + least), finer, columns, beside) {
             log = self.numbered((g, better), 1, columns, beside);
         }
-        let knotted = with_knots(&self.groups[g].group, beside.state, columns);
         self.exchanged((g, log + *JUMPS), knotted, columns, beside).unwrap_or(log)
     }
 

@@ -63,7 +63,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     groups: Vec<PlaceGroups>,
     scale: f64,
     whole: KnownCauses<'l>,
-    /// Mean square of what the richest model leaves, over that of the noise that its statement and repeats show.
+    /// Mean square of what the model leaves, over that of the noise that its statement and repeats show.
     left: f64,
     beside: SurveyedPlaces,
     findings: FindingGroups,
@@ -78,9 +78,8 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         let least = sight.fitter.least_of_the_noise();
-        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
-        let left = louder / least;
-        let louder = louder.max(least);
+        let left = louder(&sight.frame, &whole, None, scale, sight.fitter) / least;
+        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter).max(least);
         if louder > *LOUDER || louder < 1.0 / *LOUDER && least < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);

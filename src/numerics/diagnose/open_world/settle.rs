@@ -4,7 +4,7 @@ use super::groups::Memory;
 use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
-use crate::criteria::open_world::ROUNDS;
+use crate::criteria::open_world::{PLACES, ROUNDS};
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -45,8 +45,10 @@ pub(crate) fn settle(
             if round < *ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }
-            if round < *ROUNDS && step.is_none() && joins {
+            let mut tries = 0;
+            while round < *ROUNDS && step.is_none() && joins && tries < *PLACES {
                 step = look.joining(&mut refused);
+                tries += 1;
             }
             if step.is_none() {
                 let contested = look.contested();
