@@ -71,6 +71,7 @@ struct BesideTerms<'b, 'f, 'a> {
 }
 
 /// What the model's causes and the list are, beside which free forms are asked.
+#[derive(Clone, Copy)]
 pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
@@ -79,6 +80,8 @@ pub(super) struct AroundGroups<'f, 'a> {
     /// Names that are taken out of the list.
     pub without: &'f [String],
     pub memory: Memory,
+    /// Without products of two curves: these follow anything where rows are few.
+    pub plain: bool,
 }
 
 impl PlaceGroups {
@@ -102,7 +105,8 @@ impl PlaceGroups {
     }
 
     fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups, kept: bool) {
-        let mut groups = groups.into_iter().filter(|group| !group.is_listed(around.without));
+        let is_asked = |group: &FreeGroup| !group.is_listed(around.without) && !(around.plain && group.curves() > 1);
+        let mut groups = groups.into_iter().filter(is_asked);
         loop {
             let (mut some, mut raw) = (Vec::new(), Vec::new());
             while raw.len() < COLUMNS * around.frame.residual_rows()

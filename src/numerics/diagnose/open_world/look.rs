@@ -72,7 +72,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, memory: Memory) -> Self {
         let without = sight.fitter.question.without;
-        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without, memory };
+        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without, memory, plain: false };
         let all = groups_of_places(&around);
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
@@ -102,23 +102,6 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         ModelChange { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
     }
 
-    pub fn left(&self) -> f64 {
-        self.left
-    }
-    pub fn bests(&self) -> Vec<String> {
-        self.beside
-            .best
-            .iter()
-            .map(|f| {
-                format!(
-                    "{} {:.0} {:?}",
-                    f.place,
-                    f.log,
-                    f.terms.iter().map(|t| format!("{:.0} {}", t.log, t.group.hypothesis().form.key())).collect::<Vec<_>>()
-                )
-            })
-            .collect()
-    }
     /// Whether more than noise is left.
     pub fn leaves_structure(&self) -> bool {
         self.left > *STRUCTURED
@@ -139,13 +122,6 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         // What joins beside them counts for them.
         let beside = self.beside.best.first().map_or(0.0, |form| (form.log + open).max(0.0));
         let more = best.log + open - (self.whole.log() - price + beside);
-        eprintln!(
-            "DBG alone {} {:.0} more {more:.0} whole {:.0} price {price:.0} beside {beside:.0} {:?}",
-            best.place,
-            best.log,
-            self.whole.log(),
-            best.terms.iter().map(|t| format!("{:.0} {}", t.log, t.group.hypothesis().form.key())).collect::<Vec<_>>()
-        );
         let all: Vec<usize> = (0..set.len()).collect();
         let sentence = || format!("a free form at {} says more than all causes: {more:.0} nats of evidence", best.place);
         (more > *STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?
@@ -180,11 +156,20 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             let is_better = all.as_ref().is_some_and(|all| own.as_ref().is_none_or(|own| all.folds.is_better_than(&own.folds)));
             if is_better { all } else { own }
         };
-        let step = named.or_else(free);
+        let step = named.or_else(free).or_else(|| self.plainly(form, price));
         if step.is_none() {
             refused.push(form.place);
         }
         step
+    }
+
+    /// The free form of a place without products of two curves, where one with them does not hold.
+    fn plainly(&self, form: &FreeForm, price: f64) -> Option<ModelStep> {
+        form.terms.iter().find(|term| term.group.curves() > 1)?;
+        let around = AroundGroups { plain: true, ..self.around };
+        let plain = PlaceGroups::of(form.place, &around, true).greedy(&self.whole, &around);
+        let sentence = || format!("a plainer free form at {} joins: {:.0} nats of evidence", plain.place, plain.log);
+        (plain.log - price > *STRONG).then(|| self.change(&[], 0.0).free(&plain.terms, sentence()))?
     }
 
     /// The terms of a free form that say more than any other place does alone: what the others take up may belong there, and is asked again

@@ -55,26 +55,6 @@ pub(crate) fn settle(
                 step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
             }
-            eprintln!(
-                "DBG round {round} memory {memory:?} left {:.3} step {:?} refused {refused:?} best {:?}",
-                look.left(),
-                step.as_ref().map(|s| &s.sentence),
-                look.bests()
-            );
-            if let Some(s) = &step {
-                eprintln!(
-                    "DBG   causes {:?} folds {:.3e} rows {} excess {:.3e}",
-                    s.state
-                        .causes
-                        .iter()
-                        .map(|c| format!("{} {:?}", c.form.key(), c.form))
-                        .map(|t| t.chars().take(330).collect::<String>())
-                        .collect::<Vec<_>>(),
-                    s.folds.rms(),
-                    s.state.screening.kept.len(),
-                    s.state.fitted.excess_sigma
-                );
-            }
             if step.is_none() && round < *ROUNDS && memory == Memory::LastMoves && look.leaves_structure() {
                 (memory, asked_alone) = (Memory::All, false);
                 refused.clear();
