@@ -113,11 +113,10 @@ impl Case {
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
         let (friction, motors) = drives(&robot, &bench, &mut draw);
-        let acting = concealed.iter().flat_map(|one| one.cause.physical.clone());
-        let effects: Vec<Physical> = acting.chain(friction.iter().cloned()).collect();
+        let effects: Vec<Physical> =
+            concealed.iter().flat_map(|one| one.cause.physical.clone()).chain(friction.iter().cloned()).collect();
         let unseen_mm = 1e3 * Site { points: &points, ..site }.unseen(fit, &effects);
-        let play = vec![play_rad / ARCSEC; robot.joints.len()];
-        let poses = Poses::default();
+        let (play, poses) = (vec![play_rad / ARCSEC; robot.joints.len()], Poses::default());
         let experiment = Experiment {
             robot: &robot,
             truth: &truth,

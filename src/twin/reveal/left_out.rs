@@ -2,15 +2,13 @@
 
 use super::mark::DUE;
 use super::paper::{Answer, Atoms, Truth, atoms};
-use super::place::NAMELESS;
+use super::place::{GIVEN, NAMELESS};
 use super::reliability::{Statement, statements};
 use super::share::Share;
 use std::collections::BTreeSet;
 
 /// A held-out error that exceeds the whole list's by this factor tells that something is left out.
 pub const TELLS: f64 = 1.1;
-/// A name that is stated with this probability or more is given.
-pub const GIVEN: f64 = 0.5;
 /// Verdicts by which nothing is left to be found.
 const CONTENT: [&str; 2] = ["explained", "nothing_missing"];
 

@@ -1,12 +1,13 @@
 //! Whether a diagnosis looked in the right place, gave no wrong name, and said `unknown` where it knew no name.
 
-use super::left_out::GIVEN;
 use super::paper::{Atoms, Cause, Finding, Truth, atoms};
 use super::share::Share;
 use std::collections::BTreeSet;
 
 /// Faults of single points: they say nothing about where a cause sits.
 const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
+/// A name that is stated with this probability or more is given.
+pub const GIVEN: f64 = 0.5;
 /// What has a place and no name.
 pub const NAMELESS: &str = "unknown";
 

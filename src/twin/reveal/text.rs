@@ -1,9 +1,9 @@
 //! The scoreboard for people and for programs.
 
 use super::board::{BINS, Board, Company, Counts, NEAR_BOUND};
-use super::left_out::{GIVEN, LeftOutShares};
+use super::left_out::LeftOutShares;
 use super::mark::{Case, DUE};
-use super::place::Places;
+use super::place::{GIVEN, Places};
 use super::reliability::{Bin, Reliability, Subject};
 use super::share::Share;
 use calib_foundation::statistics::quantile;

@@ -2,10 +2,11 @@
 
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
 use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows};
-use super::groups::{FreeGroup, GroupColumns, Memory};
+use super::groups::{FreeGroup, GroupColumns};
 use super::knots::with_knots;
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
+use super::variables::AskedMemory;
 use crate::criteria::open_world::{CLOSER, FINEST_LEVEL, GROUPS, JUMPS, LEVELS, PAYS};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
@@ -79,7 +80,7 @@ pub(super) struct AroundGroups<'f, 'a> {
     pub causes: &'f CauseColumns,
     /// Names that are taken out of the list.
     pub without: &'f [String],
-    pub memory: Memory,
+    pub memory: AskedMemory,
     /// Without products of two curves: these follow anything where rows are few.
     pub plain: bool,
 }
@@ -105,8 +106,8 @@ impl PlaceGroups {
     }
 
     fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups, kept: bool) {
-        let is_asked = |group: &FreeGroup| !group.is_listed(around.without) && !(around.plain && group.curves() > 1);
-        let mut groups = groups.into_iter().filter(is_asked);
+        let is_out = |group: &FreeGroup| group.is_listed(around.without) || around.plain && group.curves() > 1;
+        let mut groups = groups.into_iter().filter(|group| !is_out(group));
         loop {
             let (mut some, mut raw) = (Vec::new(), Vec::new());
             while raw.len() < COLUMNS * around.frame.residual_rows()

@@ -1,29 +1,14 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
+use super::variables::{AskedMemory, alike, arrows, is_alike, moved, others};
 use crate::criteria::open_world::{
-    COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NEGLIGIBLE, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
+    COARSE, EACH, FINE, FINEST, LENGTHS, MARGIN, NEGLIGIBLE, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
 use crate::effect::{Axes, Basis, Factor, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
-const ARROWS: [[i8; 3]; 13] = [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-    [1, 1, 0],
-    [1, -1, 0],
-    [1, 0, 1],
-    [1, 0, -1],
-    [0, 1, 1],
-    [0, 1, -1],
-    [1, 1, 1],
-    [1, 1, -1],
-    [1, -1, 1],
-    [-1, 1, 1],
-];
 /// Shorter links (m) have no free form of their own.
 const SHORT: f64 = 1e-3;
 
@@ -123,26 +108,17 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
     lengths.iter().copied().map(density).collect()
 }
 
-/// What is asked of the travel of joints that are not a place's own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Memory {
-    /// Their last moves: of those that show, what else they leave behind.
-    LastMoves,
-    /// All that it may leave behind: where what is left is more than noise.
-    All,
-}
-
 /// Directions of motions and values of variables at every row, computed once.
 pub(super) struct GroupColumns<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
-    pub memory: Memory,
+    pub memory: AskedMemory,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
 impl<'f, 'a> GroupColumns<'f, 'a> {
-    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>, memory: Memory) -> Self {
+    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>, memory: AskedMemory) -> Self {
         Self { frame, survey, memory, directions: Vec::new(), values: Vec::new() }
     }
 
@@ -264,7 +240,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     /// Whether a variable may be one of two: what a travel leaves behind where all memory is asked for.
     pub fn is_factor(&self, of: Variable) -> bool {
         match of {
-            Variable::Stretch { .. } | Variable::Recent { .. } => self.memory == Memory::All,
+            Variable::Stretch { .. } | Variable::Recent { .. } => self.memory == AskedMemory::All,
             _ => alike(of) == 1,
         }
     }
@@ -275,31 +251,6 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         let told = self.follows(first, second).max(self.follows(second, first));
         (told <= *TOLD).then_some(FreeGroup { motion, law, of })
     }
-}
-
-/// How many variables like this one are tried, one choice together.
-pub(super) fn alike(of: Variable) -> usize {
-    match of {
-        Variable::Position { .. } | Variable::Sighted { .. } => ARROWS.len(),
-        Variable::Stretch { .. } => LIMITS.len(),
-        Variable::Recent { .. } => FADING.len(),
-        _ => 1,
-    }
-}
-
-/// Whether two variables are the same but for a number of their own.
-pub(super) fn is_alike(one: Variable, other: Variable) -> bool {
-    match (one, other) {
-        (Variable::Stretch { joint: a, .. }, Variable::Stretch { joint: b, .. })
-        | (Variable::Recent { joint: a, .. }, Variable::Recent { joint: b, .. }) => a == b,
-        (Variable::Position { .. }, Variable::Position { .. }) | (Variable::Sighted { .. }, Variable::Sighted { .. }) => true,
-        _ => one == other,
-    }
-}
-
-/// Directions of the tool's position.
-pub(super) fn arrows() -> impl Iterator<Item = [f64; 3]> {
-    ARROWS.iter().map(|arrow| Vector3::from(*arrow).map(f64::from).normalize().into())
 }
 
 /// Whether what moves so may step at a time.
@@ -321,7 +272,7 @@ fn length(survey: &Survey, link: usize) -> f64 {
 }
 
 /// The motions of a place, and what each may follow with how many cosines.
-pub(super) fn motions(place: Place, survey: &Survey, memory: Memory) -> Vec<(Motion, Vec<(Variable, usize)>)> {
+pub(super) fn motions(place: Place, survey: &Survey, memory: AskedMemory) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
     let angles =
         |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
@@ -382,23 +333,6 @@ pub(super) fn motions(place: Place, survey: &Survey, memory: Memory) -> Vec<(Mot
             [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
         }
     }
-}
-
-/// What a joint's travel may leave behind.
-pub(super) fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Variable> {
-    let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
-    let fades = FADING.map(|time| Variable::Recent { joint, time });
-    let clocked = survey.data.has_clock();
-    sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }])
-}
-
-/// What the travel of the other joints leaves behind.
-fn others(joint: usize, survey: &Survey, memory: Memory) -> impl Iterator<Item = (Variable, usize)> {
-    let of = move |joint: usize| {
-        let all = moved(joint, survey).filter(move |of| memory == Memory::All || matches!(of, Variable::Move { .. }));
-        all.map(|of| (of, *SKETCH))
-    };
-    (0..survey.joints()).filter(move |other| *other != joint).flat_map(of)
 }
 
 /// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.

@@ -2,13 +2,13 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{AroundGroups, FreeForm, FreeTerm, PlaceGroups, side_by_side};
-use super::groups::Memory;
 use super::names::{
     ContestedName, NameCase, NameOdds, NamedFinding, SurveyedPlaces, fitted_variances, groups_of_places, survey_places,
     unit_variances,
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
+use super::variables::AskedMemory;
 use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, STRUCTURED, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
@@ -70,7 +70,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
 }
 
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
-    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, memory: Memory) -> Self {
+    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, memory: AskedMemory) -> Self {
         let without = sight.fitter.question.without;
         let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without, memory, plain: false };
         let all = groups_of_places(&around);
@@ -110,7 +110,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// The free form of one place instead of all causes, where it says more than they do together.
     pub fn alone(&self) -> Option<ModelStep> {
         let set = &self.sight.judged.set;
-        let least = if self.around.memory == Memory::All { 1 } else { 2 };
+        let least = if self.around.memory == AskedMemory::All { 1 } else { 2 };
         if self.findings.len() < least {
             return None;
         }

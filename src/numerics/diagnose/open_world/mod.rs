@@ -18,6 +18,7 @@ mod pairs;
 mod settle;
 mod state;
 mod step;
+mod variables;
 mod variants;
 
 pub(crate) use names::NameOdds;

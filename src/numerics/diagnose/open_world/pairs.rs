@@ -1,8 +1,9 @@
 //! Pairs of variables whose product may explain what is left where neither does alone: looked for by the residual's own moments, without a fit.
 
 use super::frame::ProjectedRows;
-use super::groups::{FreeGroup, GroupColumns, is_alike, motions};
+use super::groups::{FreeGroup, GroupColumns, motions};
 use super::state::KnownCauses;
+use super::variables::is_alike;
 use crate::criteria::open_world::{LOOKED_AT, PICKED, STRUCTURED};
 use crate::effect::{Motion, Place, Survey, Variable};
 

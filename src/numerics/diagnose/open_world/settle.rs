@@ -1,9 +1,9 @@
 //! What free forms add to a judged model, or put in the place of its names, as far as folds agree; and the odds of what stands.
 
-use super::groups::Memory;
 use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
+use super::variables::AskedMemory;
 use crate::criteria::open_world::{PLACES, ROUNDS};
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
@@ -32,7 +32,7 @@ pub(crate) fn settle(
 ) -> Settled {
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
-    let (mut asked_alone, mut memory) = (false, Memory::LastMoves);
+    let (mut asked_alone, mut memory) = (false, AskedMemory::LastMoves);
     // What joined may leave nothing to a cause that was there before: that goes however late it is seen.
     let mut round = 0;
     loop {
@@ -55,8 +55,8 @@ pub(crate) fn settle(
                 step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
             }
-            if step.is_none() && round < *ROUNDS && memory == Memory::LastMoves && look.leaves_structure() {
-                (memory, asked_alone) = (Memory::All, false);
+            if step.is_none() && round < *ROUNDS && memory == AskedMemory::LastMoves && look.leaves_structure() {
+                (memory, asked_alone) = (AskedMemory::All, false);
                 refused.clear();
                 continue;
             }

@@ -1,6 +1,7 @@
 //! Groups like one that shows: with other numbers of its variables, with variables that go along with these, with shorter waves.
 
-use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
+use super::groups::{FreeGroup, GroupColumns, PASSING};
+use super::variables::{alike, moved};
 use crate::criteria::open_world::{EACH, FINE, FINE_EACH};
 use crate::effect::{Basis, Factor, Law, Variable};
 use nalgebra::Vector3;
@@ -100,8 +101,8 @@ fn arrows_near(along: [f64; 3], angle: f64) -> Vec<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::variables::arrows;
     use super::*;
-    use crate::diagnose::open_world::groups::arrows;
 
     #[test]
     fn directions_near_one_are_off_it_by_the_angle_that_was_asked() {

@@ -12,7 +12,7 @@ use crate::criteria::words::{NAMELESS, NOT_NOISE, REST, WEAK};
 use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::Misfit;
-use crate::diagnose::round::Fitter;
+use crate::diagnose::round::{FitState, Fitter};
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::diagnose::words::{Ground, slower_than_noise, statement};
 use crate::effect::names;
@@ -69,8 +69,6 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
     let folds = if lengths { cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed) } else { None };
-    // The same model as before is as good as before, by the noise that is known now.
-    let before = if state.causes.is_empty() { &misfit.sizes } else { before };
     let ground = Ground { partly_nameless, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
     Diagnosis {
         dimension: misfit.dimension,
@@ -78,7 +76,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         noise_basis: basis,
         verdict,
         noise_floor: misfit.noise(basis),
-        before: ErrorLengths::of(before, &misfit.figures),
+        before: ErrorLengths::of(sizes_before(&state, before, &misfit), &misfit.figures),
         after: ErrorLengths::of(&misfit.sizes, &misfit.figures),
         held_out: misfit.held_out,
         folds,
@@ -101,6 +99,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         model,
         fitted: state.fitted,
     }
+}
+
+/// What the base model leaves of every row: of a model without a cause the same as what it leaves, by the noise that is known now.
+fn sizes_before<'s>(state: &FitState, before: &'s [Option<f64>], misfit: &'s Misfit) -> &'s [Option<f64>] {
+    if state.causes.is_empty() { &misfit.sizes } else { before }
 }
 
 /// The findings with their forms as the model has them.
