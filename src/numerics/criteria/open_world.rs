@@ -15,8 +15,6 @@ criteria! {
     JUMPS: f64 = 10.0, "ln of evidence", "literature: twice very strong, Kass and Raftery (1995)", "";
     /// How often the number of a group's variable is halved in its step.
     LEVELS: i32 = 4, "levels", "judgement: bounds time", "";
-    /// The same at most, where a further level still pays.
-    FINEST_LEVEL: i32 = 9, "levels", "judgement: bounds time", "";
     /// Groups whose shorter lengths are looked at.
     CLOSER: usize = 10, "groups", "judgement: bounds time", "";
     /// Correlation lengths of smooth functions, shares of their variable's range.
@@ -31,8 +29,6 @@ criteria! {
     SKETCH: usize = 4, "cosines", "judgement: bounds time", "";
     /// Cosines of each of two variables.
     EACH: usize = 4, "cosines", "judgement: bounds time", "";
-    /// Cosines of each of two variables of a product that shows.
-    FINE_EACH: usize = 8, "cosines", "judgement: bounds time", "";
     /// Cosines by which one of two variables is told from the other.
     TOLD_BY: usize = 6, "cosines", "judgement: bounds time", "";
     /// The share of its variance above which one variable follows the other: then it shows no product of both.
@@ -43,8 +39,6 @@ criteria! {
     NUMBERS: usize = 3, "values", "count: three values bear no curve", "";
     /// Places of a knot that are tried.
     KNOTS: usize = 48, "places", "judgement: bounds time; the best are refined", "";
-    /// The same of a product with many functions at least.
-    FEWEST_KNOTS: usize = 12, "places", "judgement: a jump is between two of them", "";
     /// Places around a knot that are tried in the end.
     CLOSER_KNOTS: usize = 8, "places", "judgement: bounds time", "";
     /// Rows between two knots, and beyond the last, for each number that is fitted there.

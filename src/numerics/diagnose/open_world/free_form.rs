@@ -6,8 +6,7 @@ use super::groups::{FreeGroup, GroupColumns};
 use super::knots::with_knots;
 use super::pairs::pairs;
 use super::state::{AskedGroup, CauseColumns, KnownCauses};
-use super::variables::AskedMemory;
-use crate::criteria::open_world::{CLOSER, FINEST_LEVEL, GROUPS, JUMPS, LEVELS, PAYS};
+use crate::criteria::open_world::{CLOSER, GROUPS, JUMPS, LEVELS, PAYS};
 use crate::effect::{Place, Survey};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -72,7 +71,6 @@ struct BesideTerms<'b, 'f, 'a> {
 }
 
 /// What the model's causes and the list are, beside which free forms are asked.
-#[derive(Clone, Copy)]
 pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
@@ -80,16 +78,13 @@ pub(super) struct AroundGroups<'f, 'a> {
     pub causes: &'f CauseColumns,
     /// Names that are taken out of the list.
     pub without: &'f [String],
-    pub memory: AskedMemory,
-    /// Without products of two curves: these follow anything where rows are few.
-    pub plain: bool,
 }
 
 impl PlaceGroups {
     /// All groups; without their columns unless these are to be `kept`: only a free form of several groups needs them, beside causes alone
     /// products say all.
     pub fn of(place: Place, around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
         let all = columns.of(place);
         let mut out = Self { place, groups: Vec::new() };
         out.take(all, &mut columns, around, kept);
@@ -98,7 +93,7 @@ impl PlaceGroups {
 
     /// With the products of two variables that what some states leave points at.
     pub fn with_pairs(&self, states: &[&KnownCauses], around: &AroundGroups, kept: bool) -> Self {
-        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
         let mut out = self.clone();
         let new = pairs(self.place, states, around.frame, &mut columns, around.survey);
         out.take(new, &mut columns, around, kept);
@@ -106,8 +101,7 @@ impl PlaceGroups {
     }
 
     fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups, kept: bool) {
-        let is_out = |group: &FreeGroup| group.is_listed(around.without) || around.plain && group.curves() > 1;
-        let mut groups = groups.into_iter().filter(|group| !is_out(group));
+        let mut groups = groups.into_iter().filter(|group| !group.is_listed(around.without));
         loop {
             let (mut some, mut raw) = (Vec::new(), Vec::new());
             while raw.len() < COLUMNS * around.frame.residual_rows()
@@ -171,25 +165,17 @@ impl PlaceGroups {
         let start = self.paid(g, beside.state);
         // The first group of a place decides which place it is.
         let relatives = if beside.terms.is_empty() { columns.relatives(&self.groups[g].group) } else { Vec::new() };
-        // Shapes of two curves take long: only the best of these gets its own.
-        let two = self.groups[g].group.curves() > 1;
-        let asked = |groups: &mut Self, at: (usize, f64), columns: &mut GroupColumns| {
-            if two { groups.numbered(at, 0, columns, beside) } else { groups.shaped(at, columns, beside) }
-        };
-        let mut log = asked(self, (g, start), columns);
+        let mut log = self.shaped((g, start), columns, beside);
         for alike in relatives {
             let first = self.groups.len();
             self.groups.push(self.groups[g].clone());
             let begun = self.exchanged((first, f64::NEG_INFINITY), alike, columns, beside);
-            let other = asked(self, (first, begun.unwrap_or(f64::NEG_INFINITY)), columns);
+            let other = self.shaped((first, begun.unwrap_or(f64::NEG_INFINITY)), columns, beside);
             if other > log {
                 log = other;
                 self.groups.swap(g, first);
             }
             self.groups.truncate(first);
-        }
-        if two {
-            log = self.shaped((g, log), columns, beside);
         }
         log - start
     }
@@ -197,28 +183,18 @@ impl PlaceGroups {
     /// Moves the numbers of a group's variables to where the evidence is largest, and gives it shorter waves, jumps or corners where these say
     /// more; returns the evidence of what stands there.
     fn shaped(&mut self, (g, mut log): (usize, f64), columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
-        log = self.numbered((g, log), 0, columns, beside);
-        let knotted = with_knots(&self.groups[g].group, beside.state, columns);
-        // The plainer of two shapes that say as much is kept; most curves have no jumps, and finer ones of two have very many numbers.
-        let finer = columns.finer(&self.groups[g].group).into_iter().collect();
-        let least = if self.groups[g].group.curves() > 1 { *JUMPS } else { *PAYS };
-        if let Some(better) = self.exchanged((g, log + least), finer, columns, beside) {
-            log = self.numbered((g, better), 1, columns, beside);
-        }
-        self.exchanged((g, log + *JUMPS), knotted, columns, beside).unwrap_or(log)
-    }
-
-    /// Moves the numbers of a group's variables to where the evidence is largest, closer with every level from one on; returns that evidence.
-    fn numbered(&mut self, (g, mut log): (usize, f64), from: i32, columns: &mut GroupColumns, beside: &BesideTerms) -> f64 {
-        for level in from..*FINEST_LEVEL {
+        for level in 0..*LEVELS {
             let near = columns.near(&self.groups[g].group, level);
-            let better = self.exchanged((g, log), near, columns, beside);
-            if level + 1 >= *LEVELS && better.is_none_or(|better| better < log + *PAYS) {
+            if near.is_empty() {
                 break;
             }
-            log = better.unwrap_or(log);
+            log = self.exchanged((g, log), near, columns, beside).unwrap_or(log);
         }
-        log
+        // The plainer of two shapes that say as much is kept; most curves have no jumps.
+        let finer = columns.finer(&self.groups[g].group).into_iter().collect();
+        log = self.exchanged((g, log + *PAYS), finer, columns, beside).unwrap_or(log);
+        let knotted = with_knots(&self.groups[g].group, beside.state, columns);
+        self.exchanged((g, log + *JUMPS), knotted, columns, beside).unwrap_or(log)
     }
 
     /// ln of the evidence of a group beside a state without the price of its place among others like it; none of an amplitude that no arm has.
@@ -268,7 +244,7 @@ impl PlaceGroups {
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
         let (mut now, mut terms): (_, Vec<FreeTerm>) = (state.clone(), Vec::new());
         let mut log = f64::NEG_INFINITY;
-        let mut columns = GroupColumns::new(around.frame, around.survey, around.memory);
+        let mut columns = GroupColumns::new(around.frame, around.survey);
         for step in 0..*GROUPS {
             let scan = self.scan(&now);
             let paid = |g: usize| scan[g].0.log - self.price(g);

@@ -1,14 +1,29 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use super::variables::{AskedMemory, alike, arrows, is_alike, moved, others};
 use crate::criteria::open_world::{
-    COARSE, EACH, FINE, FINEST, LENGTHS, MARGIN, NEGLIGIBLE, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
+    COARSE, EACH, FADING, FINE, FINEST, LENGTHS, LIMITS, MARGIN, NEGLIGIBLE, NUMBERS, SKETCH, STEPS, TOLD, TOLD_BY,
 };
 use crate::effect::{Axes, Basis, Factor, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, names};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::f64::consts::PI;
 
+/// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
+const ARROWS: [[i8; 3]; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [-1, 1, 1],
+];
 /// Shorter links (m) have no free form of their own.
 const SHORT: f64 = 1e-3;
 
@@ -112,14 +127,13 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
 pub(super) struct GroupColumns<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
-    pub memory: AskedMemory,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
 impl<'f, 'a> GroupColumns<'f, 'a> {
-    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>, memory: AskedMemory) -> Self {
-        Self { frame, survey, memory, directions: Vec::new(), values: Vec::new() }
+    pub fn new(frame: &'f ProjectedRows<'a>, survey: &'f Survey<'f>) -> Self {
+        Self { frame, survey, directions: Vec::new(), values: Vec::new() }
     }
 
     /// A variable at every row, where every row tells it.
@@ -207,7 +221,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
     /// All groups of a place.
     pub fn of(&mut self, place: Place) -> Vec<FreeGroup> {
         let (mut out, survey) = (Vec::new(), self.survey);
-        for (motion, variables) in motions(place, survey, self.memory) {
+        for (motion, variables) in motions(place, survey) {
             for (of, count) in variables {
                 if let Some(basis) = self.basis(of, count) {
                     out.push(FreeGroup { motion, law: Law::new(of, basis), of: alike(of) });
@@ -230,19 +244,11 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             return Vec::new();
         }
         let of = group.law.first.of;
-        let all = motions(group.place(), self.survey, self.memory);
+        let all = motions(group.place(), self.survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
-        let others = others.map(|(other, _)| other).filter(|other| self.is_factor(*other));
-        let single: Vec<Variable> = others.filter(|other| !is_alike(*other, of)).collect();
+        // What has a number of its own to be found is no second factor.
+        let single: Vec<Variable> = others.map(|(other, _)| other).filter(|other| *other != of && alike(*other) == 1).collect();
         single.into_iter().filter_map(|other| self.product(group.motion, [of, other], group.of)).collect()
-    }
-
-    /// Whether a variable may be one of two: what a travel leaves behind where all memory is asked for.
-    pub fn is_factor(&self, of: Variable) -> bool {
-        match of {
-            Variable::Stretch { .. } | Variable::Recent { .. } => self.memory == AskedMemory::All,
-            _ => alike(of) == 1,
-        }
     }
 
     /// The product of two variables, where the rows show one: neither follows the other.
@@ -251,6 +257,21 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         let told = self.follows(first, second).max(self.follows(second, first));
         (told <= *TOLD).then_some(FreeGroup { motion, law, of })
     }
+}
+
+/// How many variables like this one are tried, one choice together.
+pub(super) fn alike(of: Variable) -> usize {
+    match of {
+        Variable::Position { .. } | Variable::Sighted { .. } => ARROWS.len(),
+        Variable::Stretch { .. } => LIMITS.len(),
+        Variable::Recent { .. } => FADING.len(),
+        _ => 1,
+    }
+}
+
+/// Directions of the tool's position.
+pub(super) fn arrows() -> impl Iterator<Item = [f64; 3]> {
+    ARROWS.iter().map(|arrow| Vector3::from(*arrow).map(f64::from).normalize().into())
 }
 
 /// Whether what moves so may step at a time.
@@ -272,7 +293,7 @@ fn length(survey: &Survey, link: usize) -> f64 {
 }
 
 /// The motions of a place, and what each may follow with how many cosines.
-pub(super) fn motions(place: Place, survey: &Survey, memory: AskedMemory) -> Vec<(Motion, Vec<(Variable, usize)>)> {
+pub(super) fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
     let angles =
         |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { *FINE } else { *COARSE }));
@@ -284,7 +305,7 @@ pub(super) fn motions(place: Place, survey: &Survey, memory: AskedMemory) -> Vec
     };
     let moved = |joint: usize| {
         let own = moved(joint, survey).map(|of| (of, if alike(of) > 1 { *SKETCH } else { *COARSE }));
-        own.chain(others(joint, survey, memory))
+        own.chain(others(joint, survey))
     };
     let space = || arrows().map(|along| (Variable::Position { along }, *SKETCH));
     match place {
@@ -314,7 +335,7 @@ pub(super) fn motions(place: Place, survey: &Survey, memory: AskedMemory) -> Vec
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, *FINE));
             let space = arrows().map(|along| (Variable::Sighted { along }, *SKETCH));
-            let moves = others(joints, survey, memory);
+            let moves = others(joints, survey);
             let own: Vec<_> =
                 sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(moves).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
@@ -333,6 +354,19 @@ pub(super) fn motions(place: Place, survey: &Survey, memory: AskedMemory) -> Vec
             [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
         }
     }
+}
+
+/// What a joint's travel may leave behind.
+pub(super) fn moved(joint: usize, survey: &Survey) -> impl Iterator<Item = Variable> {
+    let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
+    let fades = FADING.map(|time| Variable::Recent { joint, time });
+    let clocked = survey.data.has_clock();
+    sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }])
+}
+
+/// The last moves of the other joints: what else they leave behind is asked of those that show.
+fn others(joint: usize, survey: &Survey) -> impl Iterator<Item = (Variable, usize)> {
+    (0..survey.joints()).filter(move |other| *other != joint).map(|joint| (Variable::Move { joint }, *SKETCH))
 }
 
 /// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.

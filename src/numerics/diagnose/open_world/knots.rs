@@ -5,7 +5,7 @@ use super::evidence::evidence;
 use super::frame::GroupProducts;
 use super::groups::{FreeGroup, GroupColumns};
 use super::state::KnownCauses;
-use crate::criteria::open_world::{BETWEEN_KNOTS, CLOSER_KNOTS, FEWEST_KNOTS, KNOTS, PAYS};
+use crate::criteria::open_world::{BETWEEN_KNOTS, CLOSER_KNOTS, KNOTS, PAYS};
 use crate::effect::{Basis, Factor, Knots, Law, Variable};
 use nalgebra::{DMatrix, DVector};
 
@@ -22,6 +22,9 @@ pub(super) fn with_knots(group: &FreeGroup, state: &KnownCauses, columns: &mut G
     let mut ways = vec![(first, times)];
     ways.extend(times.map(|times| (times, Some(first))));
     let mut out = Vec::new();
+    if group.curves() > 1 {
+        return out;
+    }
     // A few rows that are wrong one after another are no jump to and fro in time; one step in time is a group of its own.
     for (of, other) in ways.into_iter().filter(|(of, _)| of.basis.is_curve() && of.of != Variable::Time) {
         let Some(mut values) = columns.values(of.of).map(<[f64]>::to_vec) else { continue };
@@ -60,7 +63,7 @@ struct KnotSearch<'k, 'f, 'a, 's> {
 impl KnotSearch<'_, '_, '_, '_> {
     /// The group with the knots that pay, out of values `between` those of the rows.
     fn group_with(mut self, between: &[f64]) -> Option<FreeGroup> {
-        let coarse = spread(between, (*KNOTS / self.other.map_or(1, |other| other.count())).max(*FEWEST_KNOTS));
+        let coarse = spread(between, *KNOTS / self.other.map_or(1, |other| other.count()));
         let first = self.best(&coarse)?;
         // Closer around those that pay.
         let width = (between.len() / coarse.len()).max(1);

@@ -8,8 +8,7 @@ use super::names::{
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use super::variables::AskedMemory;
-use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, STRUCTURED, WORSE};
+use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -63,30 +62,27 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     groups: Vec<PlaceGroups>,
     scale: f64,
     whole: KnownCauses<'l>,
-    /// Mean square of what the model leaves, over that of the noise that its statement and repeats show.
-    left: f64,
     beside: SurveyedPlaces,
     findings: FindingGroups,
 }
 
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
-    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>, memory: AskedMemory) -> Self {
+    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
-        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without, memory, plain: false };
+        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without };
         let all = groups_of_places(&around);
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
-        let least = sight.fitter.least_of_the_noise();
-        let left = louder(&sight.frame, &whole, None, scale, sight.fitter) / least;
-        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter).max(least);
-        if louder > *LOUDER || louder < 1.0 / *LOUDER && least < 1.0 {
+        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
+        let louder = louder.max(sight.fitter.least_of_the_noise());
+        if louder > *LOUDER || louder < 1.0 / *LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);
             beside = survey_places(&[(whole.clone(), None)], &all, &around).remove(0);
         }
         let findings = groups(&sight.judged.state, &sight.judged.set, pool, survey);
-        Self { sight, pool, around, groups: all, scale, whole, left, beside, findings }
+        Self { sight, pool, around, groups: all, scale, whole, beside, findings }
     }
 
     fn case(&self) -> NameCase<'_, 'l, 'v, 'a> {
@@ -102,16 +98,10 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         ModelChange { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
     }
 
-    /// Whether more than noise is left.
-    pub fn leaves_structure(&self) -> bool {
-        self.left > *STRUCTURED
-    }
-
     /// The free form of one place instead of all causes, where it says more than they do together.
     pub fn alone(&self) -> Option<ModelStep> {
         let set = &self.sight.judged.set;
-        let least = if self.around.memory == AskedMemory::All { 1 } else { 2 };
-        if self.findings.len() < least {
+        if self.findings.len() < 2 {
             return None;
         }
         let none = self.sight.state(&|_| false, self.scale);
@@ -119,9 +109,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let case = self.case();
         let [open, listed] = case.priors(self.beside.logs.len());
         let price: f64 = set.iter().map(|h| case.price(*h) - listed + *SIZE).sum();
-        // What joins beside them counts for them.
-        let beside = self.beside.best.first().map_or(0.0, |form| (form.log + open).max(0.0));
-        let more = best.log + open - (self.whole.log() - price + beside);
+        let more = best.log + open - (self.whole.log() - price);
         let all: Vec<usize> = (0..set.len()).collect();
         let sentence = || format!("a free form at {} says more than all causes: {more:.0} nats of evidence", best.place);
         (more > *STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?
@@ -156,20 +144,11 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             let is_better = all.as_ref().is_some_and(|all| own.as_ref().is_none_or(|own| all.folds.is_better_than(&own.folds)));
             if is_better { all } else { own }
         };
-        let step = named.or_else(free).or_else(|| self.plainly(form, price));
+        let step = named.or_else(free);
         if step.is_none() {
             refused.push(form.place);
         }
         step
-    }
-
-    /// The free form of a place without products of two curves, where one with them does not hold.
-    fn plainly(&self, form: &FreeForm, price: f64) -> Option<ModelStep> {
-        form.terms.iter().find(|term| term.group.curves() > 1)?;
-        let around = AroundGroups { plain: true, ..self.around };
-        let plain = PlaceGroups::of(form.place, &around, true).greedy(&self.whole, &around);
-        let sentence = || format!("a plainer free form at {} joins: {:.0} nats of evidence", plain.place, plain.log);
-        (plain.log - price > *STRONG).then(|| self.change(&[], 0.0).free(&plain.terms, sentence()))?
     }
 
     /// The terms of a free form that say more than any other place does alone: what the others take up may belong there, and is asked again

@@ -18,7 +18,6 @@ mod pairs;
 mod settle;
 mod state;
 mod step;
-mod variables;
 mod variants;
 
 pub(crate) use names::NameOdds;

@@ -157,9 +157,9 @@ impl NameCase<'_, '_, '_, '_> {
         };
         let alternative = instead.best.first().filter(|form| !form.terms.is_empty());
         let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
-        // What has no name may act otherwise, or somewhere else: it was the best of its round, beside less than is known now.
-        let may_go = !is_named || odds.none > 0.5;
-        let instead = alternative.filter(|_| may_go).filter(|form| form.log > with_more + *CLEARLY).cloned();
+        // What has no name may act somewhere else: it was the best of its round, beside less than is known now.
+        let may_go = |form: &&FreeForm| if is_named { odds.none > 0.5 } else { form.place != place };
+        let instead = alternative.filter(may_go).filter(|form| form.log > with_more + *CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;

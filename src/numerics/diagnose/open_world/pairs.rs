@@ -1,9 +1,8 @@
 //! Pairs of variables whose product may explain what is left where neither does alone: looked for by the residual's own moments, without a fit.
 
 use super::frame::ProjectedRows;
-use super::groups::{FreeGroup, GroupColumns, motions};
+use super::groups::{FreeGroup, GroupColumns, alike, motions};
 use super::state::KnownCauses;
-use super::variables::is_alike;
 use crate::criteria::open_world::{LOOKED_AT, PICKED, STRUCTURED};
 use crate::effect::{Motion, Place, Survey, Variable};
 
@@ -22,35 +21,22 @@ pub(super) fn pairs(
         return Vec::new();
     }
     let mut out = Vec::new();
-    for (motion, variables) in motions(place, survey, columns.memory) {
-        let known =
-            variables.iter().map(|(of, _)| *of).filter(|of| columns.is_factor(*of) && !is_another_joints_move(*of, place));
-        let known: Vec<Variable> = known.collect();
+    for (motion, variables) in motions(place, survey) {
+        let known = variables.iter().map(|(of, _)| *of).filter(|of| alike(*of) == 1 && !is_another_joints_move(*of, place));
         let known: Vec<(Variable, Vec<Vec<f64>>)> =
-            known.into_iter().filter_map(|of| Some((of, columns.functions(of, *LOOKED_AT)?))).collect();
+            known.filter_map(|of| Some((of, columns.functions(of, *LOOKED_AT)?))).collect();
         let seen = SeenMotion::of(motion, &left, frame);
         let mut scores: Vec<([usize; 2], f64)> = Vec::new();
-        for (a, (own, first)) in known.iter().enumerate() {
-            let others = known.iter().enumerate().skip(a + 1).filter(|(_, (other, _))| !is_alike(*other, *own));
+        for (a, (_, first)) in known.iter().enumerate() {
+            let others = known.iter().enumerate().skip(a + 1);
             scores.extend(others.map(|(b, (_, second))| ([a, b], seen.score(first, second))));
         }
         scores.sort_by(|a, b| b.1.total_cmp(&a.1));
         let tried = scores.len();
         // What lowers the squared residual by less cannot pay for its choice.
         let price = 2.0 * (tried.max(1) as f64).ln();
-        let of = |[a, b]: [usize; 2]| [known[a].0, known[b].0];
-        let mut picked: Vec<[Variable; 2]> = Vec::new();
-        for pair in scores.iter().filter(|(_, score)| *score > price).map(|(pair, _)| of(*pair)) {
-            // The best number of each memory is enough.
-            let is_new = picked.iter().all(|other| !(is_alike(pair[0], other[0]) && is_alike(pair[1], other[1])));
-            if picked.len() < *PICKED
-                && is_new
-                && let Some(group) = columns.product(motion, pair, tried)
-            {
-                picked.push(pair);
-                out.push(group);
-            }
-        }
+        let of = |([a, b], _): &([usize; 2], f64)| columns.product(motion, [known[*a].0, known[*b].0], tried);
+        out.extend(scores.iter().filter(|(_, score)| *score > price).filter_map(of).take(*PICKED));
     }
     out
 }

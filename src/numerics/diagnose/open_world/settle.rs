@@ -3,8 +3,7 @@
 use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
 use super::step::ModelStep;
-use super::variables::AskedMemory;
-use crate::criteria::open_world::{PLACES, ROUNDS};
+use crate::criteria::open_world::ROUNDS;
 use crate::diagnose::finding_groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -32,7 +31,7 @@ pub(crate) fn settle(
 ) -> Settled {
     let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
-    let (mut asked_alone, mut memory) = (false, AskedMemory::LastMoves);
+    let mut asked_alone = false;
     // What joined may leave nothing to a cause that was there before: that goes however late it is seen.
     let mut round = 0;
     loop {
@@ -41,24 +40,17 @@ pub(crate) fn settle(
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {
             let sight = Sighted::of(&view, &judged, fitter);
-            let look = OpenWorldLook::of(&sight, pool, survey, memory);
+            let look = OpenWorldLook::of(&sight, pool, survey);
             if round < *ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }
-            let mut tries = 0;
-            while round < *ROUNDS && step.is_none() && joins && tries < *PLACES {
+            if round < *ROUNDS && step.is_none() && joins {
                 step = look.joining(&mut refused);
-                tries += 1;
             }
             if step.is_none() {
                 let contested = look.contested();
                 step = if round < *ROUNDS { look.exchange(&contested) } else { look.dropped(&contested) };
                 odds = contested.iter().map(|(key, own)| (*key, look.odds(key, own))).collect();
-            }
-            if step.is_none() && round < *ROUNDS && memory == AskedMemory::LastMoves && look.leaves_structure() {
-                (memory, asked_alone) = (AskedMemory::All, false);
-                refused.clear();
-                continue;
             }
         }
         let Some(ModelStep { state, kept, new, sentence, .. }) = step else { return Settled { judged, odds } };

@@ -1,9 +1,8 @@
 //! Groups like one that shows: with other numbers of its variables, with variables that go along with these, with shorter waves.
 
-use super::groups::{FreeGroup, GroupColumns, PASSING};
-use super::variables::{alike, moved};
-use crate::criteria::open_world::{EACH, FINE, FINE_EACH};
-use crate::effect::{Basis, Factor, Law, Variable};
+use super::groups::{FreeGroup, GroupColumns, PASSING, alike, moved};
+use crate::criteria::open_world::{EACH, FINE};
+use crate::effect::{Factor, Law, Variable};
 use nalgebra::Vector3;
 
 impl GroupColumns<'_, '_> {
@@ -37,10 +36,7 @@ impl GroupColumns<'_, '_> {
                 Variable::Angle { joint } | Variable::Approach { joint } | Variable::Move { joint } => {
                     moved(joint, survey).collect()
                 }
-                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => {
-                    // What hardly ever slips follows the angle.
-                    moved(joint, survey).chain([Variable::Angle { joint }]).collect()
-                }
+                Variable::Stretch { joint, .. } | Variable::Recent { joint, .. } => moved(joint, survey).collect(),
                 // By themselves these are asked at every place.
                 _ if group.law.times.is_some() && PASSING.contains(&of) => PASSING.to_vec(),
                 _ => Vec::new(),
@@ -58,30 +54,28 @@ impl GroupColumns<'_, '_> {
         out
     }
 
-    /// A group with others in the place of each of its variables, by no fewer functions.
+    /// A group with others in the place of each of its variables.
     fn with_other_variables(&mut self, group: &FreeGroup, others: impl Fn(Variable) -> Vec<Variable>) -> Vec<FreeGroup> {
         let Law { first, times } = group.law;
-        let least = if times.is_some() { *EACH } else { *FINE };
+        let count = if times.is_some() { *EACH } else { *FINE };
         let mut laws = Vec::new();
-        let mut basis = |of: Variable, old: &Basis| {
-            let count = if let Basis::Cosines { count, .. } = *old { count.max(least) } else { least };
-            if times.is_some() { self.factor(of, count) } else { self.basis(of, count) }
-        };
+        let mut basis = |of: Variable| if times.is_some() { self.factor(of, count) } else { self.basis(of, count) };
         for of in others(first.of) {
-            laws.extend(basis(of, &first.basis).map(|basis| Law { first: Factor::new(of, basis), times }));
+            laws.extend(basis(of).map(|basis| Law { first: Factor::new(of, basis), times }));
         }
-        if let Some(times) = times {
-            for of in others(times.of) {
-                laws.extend(basis(of, &times.basis).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
-            }
+        for of in times.map_or(Vec::new(), |times| others(times.of)) {
+            laws.extend(basis(of).map(|basis| Law { first, times: Some(Factor::new(of, basis)) }));
         }
         let of = |law: &Law| if times.is_some() { group.of } else { alike(law.first.of) };
         laws.into_iter().map(|law| FreeGroup { motion: group.motion, law, of: of(&law) }).collect()
     }
 
-    /// A group with more and shorter waves.
+    /// A group with more and shorter waves; none of a product of two curves.
     pub fn finer(&mut self, group: &FreeGroup) -> Option<FreeGroup> {
-        let count = if group.curves() > 1 { *FINE_EACH } else { *FINE };
+        if group.curves() > 1 {
+            return None;
+        }
+        let count = *FINE;
         let two = group.law.times.is_some();
         let mut basis = |of: Variable| if two { self.factor(of, count) } else { self.basis(of, count) };
         let mut finer = |factor: Factor| Some(Factor::new(factor.of, basis(factor.of)?));
@@ -101,8 +95,8 @@ fn arrows_near(along: [f64; 3], angle: f64) -> Vec<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::variables::arrows;
     use super::*;
+    use crate::diagnose::open_world::groups::arrows;
 
     #[test]
     fn directions_near_one_are_off_it_by_the_angle_that_was_asked() {
