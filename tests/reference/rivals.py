@@ -191,7 +191,9 @@ def mark(truth, answer):
     out["alarm"] = out["null"] and bool(found)
     p = truth["geometry_rank"] + sum(len(e["parameters"]) for e in truth["effects"])
     n = 3 * truth["points"]["fit"]
-    bound = 3**0.5 * truth["noise"]["validate_rms_per_axis_mm"] * (1 + p / max(n - p - 1, 1))**0.5
+    noise = truth["noise"]
+    square = noise["validate_rms_per_axis_mm"]**2 * (1 + p / max(n - p - 1, 1))
+    bound = (3 * (square + noise.get("unseen_rms_per_axis_mm", 0.0)**2))**0.5
     out["ratio"] = answer["held_mm"] / bound if "held_mm" in answer else None
     return out
 

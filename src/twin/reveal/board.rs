@@ -194,7 +194,7 @@ impl Board {
         Share::of(due.filter_map(|case| case.held_out.map(|held_out| held_out.after > held_out.before)))
     }
 
-    /// Of these, those whose held-out error is above its bound, too.
+    /// Recordings with a due effect whose held-out error is larger with the findings than before, and than its bound.
     pub fn worse_than_bound(&self) -> Share {
         let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
         let is_worse = |held_out: HeldOut| held_out.after > held_out.before.max(held_out.bound);
