@@ -70,6 +70,10 @@ criteria! {
     /// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of
     /// names that were wrong where it was sure of them.
     MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "changes nothing on 2";
+    /// That a law without a name acts at its place where it is the only one, beside what evidence says of it.
+    PLACED: f64 = 0.95, "probability", "count: 52 of 55 such findings of concealed foreign effects", "";
+    /// The same where several laws without a name share the error: one effect may be split over places that are not its own.
+    PLACED_AMONG: f64 = 0.65, "probability", "count: 24 of 37 such findings of concealed foreign effects", "";
     /// That a cause which is taken out of the list is called by another name with 0.9 or more.
     MIMICRY: f64 = 0.2, "probability", "count: 32 of 164 concealed causes of L 50 or more", "";
     /// What the criterion must lose without a name that stands beside a free form.
