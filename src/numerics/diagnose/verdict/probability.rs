@@ -29,12 +29,18 @@ pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
 }
 
 /// Lowers the probabilities of the places of findings without a name: evidence knows free forms at places, and errs more often where several
-/// share what one effect does.
+/// share what one effect does. What is elsewhere is no longer what the finding says.
 pub(super) fn weigh_places(findings: &mut [Finding]) {
     let is_nameless = |finding: &Finding| finding.effect == names::UNKNOWN;
     let count = findings.iter().filter(|finding| is_nameless(finding)).count();
     let most = if count > 1 { *PLACED_AMONG } else { *PLACED };
-    findings.iter_mut().filter(|finding| is_nameless(finding)).for_each(|finding| finding.probabilities.place *= most);
+    for finding in findings.iter_mut().filter(|finding| is_nameless(finding)) {
+        let Probabilities { name, place, none } = &mut finding.probabilities;
+        *place *= most;
+        let all = *name + *none;
+        *name *= *place;
+        *none = all - *name;
+    }
 }
 
 /// The weight of a rival beside a name whose weight is 1; only identities differ by nothing at all.
@@ -102,7 +108,7 @@ mod tests {
         let nameless = || {
             let mut out = finding(200.0, &[]);
             out.effect = names::UNKNOWN;
-            out.probabilities.place = 1.0;
+            out.probabilities = Probabilities { name: 0.75, place: 1.0, none: 0.0 };
             out
         };
         let mut named = finding(200.0, &[]);
@@ -111,6 +117,11 @@ mod tests {
             weigh_places(&mut findings);
             findings.iter().map(|finding| finding.probabilities.place).collect::<Vec<_>>()
         };
+        let mut alone = [nameless()];
+        weigh_places(&mut alone);
+        let Probabilities { name, place, none } = alone[0].probabilities;
+        assert_eq!((name, place), (0.75 * *PLACED, *PLACED));
+        assert!((name + none - 0.75).abs() < 1e-12, "rivals have what they had");
         assert_eq!(places(vec![named.clone(), nameless()]), [1.0, *PLACED]);
         assert_eq!(places(vec![nameless(), named, nameless()]), [*PLACED_AMONG, 1.0, *PLACED_AMONG]);
     }
