@@ -3,7 +3,8 @@
     python3 tests/reference/calibrate_probability.py DIR [DIR ...]
 
 Of recordings with one listed cause of L 50 or more, diagnosed with the whole list and without that cause: MIMICRY, TEMPERATURE and
-IDENTITY by the least Brier score of the names that are stated, where 0.3 of all causes are in no list. Of foreign effects: by what the
+IDENTITY by the least Brier score of the names that are stated, where 0.3 of all causes are in no list, but for several names that take up
+loads, which are counted (MIMICRY_OF_LOADS is the ratio of the counts, each with a half more). Of foreign effects: by what the
 stated probabilities of places of findings without a name are to be multiplied, of one alone (PLACED) and of one of several
 (PLACED_AMONG). The numbers stand in `src/numerics/criteria`. Needs nothing but Python.
 """
@@ -17,6 +18,8 @@ from pathlib import Path
 UNLISTED = 0.3
 MISLED = 0.02
 DUE = 50.0
+# Causes several of which take up what depends on loads.
+OF_LOADS = {"joint_hardening", "joint_warming", "link_mass"}
 
 
 def atoms(effect, place):
@@ -48,11 +51,18 @@ def answers(folder):
                 yield wanted[0]["effect"], out, right, places, json.loads(answer.read_text())["findings"]
 
 
+def name_of_loads(finding):
+    """The name of a finding that takes up loads, stated or taken back; of warming only that of a stiffness."""
+    names = [finding["effect"]] + [rival["effect"] for rival in finding["rivals"] if rival["where"] == finding["where"]]
+    stiffness = any("stiffness" in number["name"] for number in finding["parameters"])
+    own = [name for name in names if name in OF_LOADS and (name != "joint_warming" or stiffness)]
+    return own[0] if own and finding["effect"] in OF_LOADS | {"unknown"} else None
+
+
 def statements(named, mimicry, temperature, identity):
-    """(weight, probability, right) of each finding with a name and of its rivals."""
+    """(weight, probability, right) of each finding with a name and of its rivals; `floor` is the least that its set states for none."""
     least = min(max(UNLISTED * mimicry / (UNLISTED * mimicry + 1.0 - UNLISTED), MISLED), 1.0 - MISLED)
-    floor = min(finding["none_probability"] for _, _, finding in named)
-    for out, right, finding in named:
+    for out, right, finding, floor in named:
         none = finding["none_probability"]
         none = least if none <= floor + 1e-9 else max(none, least)
         names = [(0.0, atoms(finding["effect"], finding["where"]))]
@@ -69,10 +79,19 @@ def brier(all_statements):
 
 
 def main():
-    every = [answer for folder in sys.argv[1:] for answer in answers(Path(folder))]
-    named = [(out, right, finding) for _, out, right, _, findings in every for finding in findings
-             if finding["effect"] != "unknown" and finding["evidence"] and finding["evidence"]["delta_bic"] is not None]
-    if any(out for out, _, _ in named):
+    sets = [list(answers(Path(folder))) for folder in sys.argv[1:]]
+    every = [answer for one in sets for answer in one]
+    least = lambda one: min(finding["none_probability"] for *_, findings in one for finding in findings if finding["effect"] != "unknown")
+    floors = [least(one) for one in sets for _ in one]
+    named, of_loads = [], [0, 0]
+    for (_, out, right, _, findings), floor in zip(every, floors):
+        loads = [finding for finding in findings if name_of_loads(finding)]
+        several = loads if len(loads) > 1 else []
+        is_right = any(atoms(name_of_loads(finding), finding["where"]) & right for finding in several)
+        of_loads[out] += bool(several) and is_right != out
+        named += [(out, right, finding, floor) for finding in findings if finding["effect"] != "unknown" and finding not in several
+                  and finding["evidence"] and finding["evidence"]["delta_bic"] is not None]
+    if any(out for out, *_ in named):
         grid = itertools.product([0.05 * k for k in range(1, 31)], [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0], [0.5, 1.0, 2.0, 4.0, 8.0])
         score, best = min((brier(statements(named, *numbers)), numbers) for numbers in grid)
         print(f"{len(named)} findings with a name: Brier score {score:.4f}")
@@ -86,6 +105,8 @@ def main():
             if own:
                 print(f"{low:4} to {high:4}: stated {sum(w * p for w, p, _ in own) / weight:.3f}, "
                       f"right {sum(w * right for w, _, right in own) / weight:.3f} of {len(own)}")
+        print(f"MIMICRY_OF_LOADS {(of_loads[1] + 0.5) / (of_loads[0] + 0.5):.1f}: recordings with several names that take up loads, "
+              f"right with the whole list {of_loads[0]}, wrong without the cause {of_loads[1]}")
     for title, alone in [("PLACED", True), ("PLACED_AMONG", False)]:
         right, stated = [], 0.0
         for effect, out, _, places, findings in every:
