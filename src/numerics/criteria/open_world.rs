@@ -76,8 +76,8 @@ criteria! {
     PLACED_AMONG: f64 = 0.64, "probability", "measured by tests/reference/calibrate_probability.py", "";
     /// How often a cause that is in no list is called by a name of the list that evidence is sure of, over how often one of the list is.
     MIMICRY: f64 = 0.2, "ratio", "measured by tests/reference/calibrate_probability.py", "";
-    /// The same of several names that take up loads: of concealed causes 62 recordings to none, of arms whose joints all harden fewer.
-    MIMICRY_OF_LOADS: f64 = 20.0, "ratio", "judgement: a sixth of what tests/reference/calibrate_probability.py measures", "";
+    /// The same of several names that take up loads.
+    MIMICRY_OF_LOADS: f64 = 20.0, "ratio", "measured by tests/reference/calibrate_probability.py", "";
     /// What the criterion must lose without a name that stands beside a free form.
     SEEN: f64 = 10.0, "-2 ln of odds", "literature: very strong, Kass and Raftery (1995)", "";
     /// What a name that stands beside a free form must have of the evidence of all names there.
