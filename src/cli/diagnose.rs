@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
 use crate::raw::ending;
 use crate::stage::DIAGNOSES;
-use crate::summary::Diagnosed;
+use crate::summary::{Diagnosed, rejected};
 use clap::Args;
 use std::ffi::OsString;
 use std::io::Write;
@@ -66,7 +66,7 @@ pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> 
 
 fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u8> {
     let store = arguments.means.store()?;
-    let told = if is_pipeline(&arguments.what) {
+    let (manifest, stage) = if is_pipeline(&arguments.what) {
         let file = arguments.what.display().to_string();
         let plan = arguments.means.plan(&arguments.what)?;
         let own = plan.stages.iter().enumerate().filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
@@ -82,8 +82,8 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         let shown = shown(arguments.quiet, arguments.details);
         let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), shown };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
-        let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
-        Diagnosed::read(&outcome.manifest.run_id, stage, &store)?
+        let stage = outcome.manifest.stage(&id).cloned();
+        (outcome.manifest, stage.ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?)
     } else {
         if arguments.means.overrides() {
             return Err(Error::spec("--set", "a finished run cannot be changed; give its pipeline instead"));
@@ -93,16 +93,18 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
             Some((run, step)) => (run, Some(step)),
             None => (&*name, arguments.step.as_deref()),
         };
-        let (manifest, stage) = diagnosis(&store, run, step, &DIAGNOSES)?;
-        Diagnosed::read(&manifest.run_id, &stage, &store)?
+        diagnosis(&store, run, step, &DIAGNOSES)?
     };
+    let told = Diagnosed::read(&manifest.run_id, &stage, &store)?;
     if let Some(file) = &arguments.export_effect {
         write_new(file, &told.effect_file(arguments.finding)?)?;
     }
     let store = arguments.means.store_again();
-    match arguments.json {
-        true => emit_json(&told.document(&store))?,
-        false => emit_lines(&if arguments.details { told.text(&store) } else { told.short(&store) })?,
+    if arguments.json {
+        emit_json(&told.document(&store))?;
+    } else {
+        let text = if arguments.details { told.text(&store) } else { told.short(&store) };
+        emit_lines(&(text + &rejected(&manifest)))?;
     }
     Ok(if told.is_wrong_setup() { WRONG_SETUP } else { 0 })
 }

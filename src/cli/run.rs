@@ -104,7 +104,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     if wrong.is_none() {
         text.push_str(&limits.text());
     }
-    text.push_str(&summary::rejected(&outcome));
+    text.push_str(&summary::rejected(&outcome.manifest));
     for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
         text.push_str(&labelled("report", &path.display().to_string()));
     }
@@ -184,7 +184,7 @@ fn document(outcome: &CompletedRun, limits: &LimitsSummary, store: &Store) -> Re
         "statistics": summary::statistics_json(outcome, store)?,
         "corrections": summary::corrections_json(outcome, store)?,
         "searches": summary::searches_json(outcome, store)?,
-        "rejected_rows": summary::rejected_rows(outcome),
+        "rejected_rows": summary::rejected_rows(&outcome.manifest),
         "report": documents.first(),
         "documents": documents,
     }))

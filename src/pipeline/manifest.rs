@@ -242,6 +242,11 @@ impl Manifest {
         self.stages.iter().find(|stage| stage.id == id)
     }
 
+    /// The tables of a kind, in pipeline order.
+    pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
+        self.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
+    }
+
     pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, options: &RunOptions, started: String) -> Self {
         Self {
             manifest_format: MANIFEST_FORMAT,

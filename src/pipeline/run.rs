@@ -28,7 +28,7 @@ pub struct CompletedRun {
 impl CompletedRun {
     /// The tables of a kind, in pipeline order.
     pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
-        self.manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
+        self.manifest.tables(kind)
     }
     /// Whether every stage was cached.
     pub fn nothing_done(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use super::{labelled, tables};
 use crate::error::{Result, counted};
-use crate::pipeline::CompletedRun;
+use crate::pipeline::{CompletedRun, Manifest};
 use crate::store::Store;
 use crate::table::{Standing, Statistics, StatisticsRow, Table};
 use serde_json::json;
@@ -141,15 +141,15 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
 }
 
 /// How many rows of the raw files were rejected.
-pub fn rejected_rows(outcome: &CompletedRun) -> u64 {
-    outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
+pub fn rejected_rows(manifest: &Manifest) -> u64 {
+    manifest.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
 }
 
 /// Nothing where nothing was rejected.
-pub fn rejected(outcome: &CompletedRun) -> String {
+pub fn rejected(manifest: &Manifest) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
         let path = output.path.as_deref().unwrap_or_default();
         labelled("rejected", &format!("{}, each with its reason in {path}", counted(output.table.rows, "row")))
     };
-    outcome.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
+    manifest.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
 }

@@ -228,4 +228,13 @@ fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner(
     let run = calib(folder.path(), &["run", "pipeline.yaml", "--store", "kept"], "");
     let told = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(told.contains("geometry  cached"), "{told}");
+    let diagnosed = format!("{PIPELINE}  - uses: split\n    with: {{by: every, n: 4}}\n  - uses: diagnose\n");
+    std::fs::write(folder.path().join("diagnosed.yaml"), diagnosed).expect("a file");
+    assert_eq!(calib(folder.path(), &["run", "diagnosed.yaml", "--store", "kept"], "").status.code(), Some(0));
+    for what in ["diagnosed.yaml", "HEAD"] {
+        let output = calib(folder.path(), &["diagnose", what, "--store", "kept"], "");
+        let out = String::from_utf8_lossy(&output.stdout).into_owned();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(out.contains("rejected  10 rows, each with its reason in kept/tables/"), "{out}{told}");
+    }
 }

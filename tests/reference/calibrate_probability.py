@@ -1,19 +1,25 @@
-"""Fits the numbers of src/numerics/diagnose/words/probability.rs to proofs (`calib simulate prove --out DIR ...`) by maximum likelihood.
+"""Fits what findings say of their own probability to proofs (`calib simulate prove --left-out --out DIR ...`, `--foreign 1`).
 
-    python3 tests/reference/calibrate_probability.py DIR[=CAUSE,CAUSE] [DIR ...]
+    python3 tests/reference/calibrate_probability.py DIR [DIR ...]
 
-Every finding with evidence is one draw: it is what it is called, one of its rivals, or none of these, by the sealed truth; names that
-the truth accepts count where none is its own. The causes after DIR are those that its pipeline left out (`diagnose: without`): they
-stand for physics that no list holds, which is `unknown` at its place, and their findings count LEFT_OUT each. Prints the numbers, the mean log likelihood and a reliability table of the statements that they make.
-Needs nothing but Python.
+Of recordings with one listed cause of L 50 or more, diagnosed with the whole list and without that cause: MIMICRY, TEMPERATURE and
+IDENTITY by the least Brier score of the names that are stated, where 0.3 of all causes are in no list, but for several names that take up
+loads, which are counted (MIMICRY_OF_LOADS is the ratio of the counts, each with a half more). Of foreign effects: by what the
+stated probabilities of places of findings without a name are to be multiplied, of one alone (PLACED) and of one of several
+(PLACED_AMONG). The numbers stand in `src/numerics/criteria`. Needs nothing but Python.
 """
+import itertools
 import json
 import math
 import re
 import sys
 from pathlib import Path
 
-LEFT_OUT = 0.3
+UNLISTED = 0.3
+MISLED = 0.02
+DUE = 50.0
+# Causes several of which take up what depends on loads.
+OF_LOADS = {"joint_hardening", "joint_warming", "link_mass"}
 
 
 def atoms(effect, place):
@@ -22,97 +28,94 @@ def atoms(effect, place):
     return {(effect, at) for at in places}
 
 
-def draws(argument):
-    """((ln loss, no law), [(delta, right) of own name and rivals], place right, weight) of every finding with evidence."""
-    folder, _, left_out = argument.partition("=")
-    folder, left_out = Path(folder), left_out.split(",") if left_out else []
-    for path in sorted((folder / "verdicts").glob("*.json")):
-        answer = json.loads(path.read_text())
-        truth = json.loads((folder / "sealed" / path.name).read_text())
-        listed = lambda effect: "unknown" if effect in left_out else effect
-        strict = [atoms(listed(name["effect"]), name["where"]) for name in truth["effects"] + truth["tampered"]]
-        accepted = [atoms(name["effect"], name["where"]) for name in truth["accepted"]]
-        places = {place for name in strict + accepted for _, place in name}
-        for finding in answer["findings"]:
-            loss = finding["evidence"]["delta_bic"]
-            if loss is None:
-                continue
-            said = [(0.0, atoms(finding["effect"], finding["where"]))]
-            said += [(rival["delta_bic"], atoms(rival["effect"], rival["where"])) for rival in finding["rivals"]]
-            known = strict if any(name in strict for _, name in said) else accepted
-            names = [(max(delta, 0.0), name in known) for delta, name in said]
-            there = any(place in places for _, place in said[0][1])
-            yield (math.log(max(loss, 1.0)), finding["effect"] == "unknown"), names, there, (LEFT_OUT if left_out else 1.0)
+def known(truth, without):
+    """Names that are right, and their places; `without` is the effect that was left out."""
+    names = truth["effects"] + truth["tampered"] + truth["accepted"]
+    names += [name for cause in truth["effects"] for name in cause.get("same") or []]
+    out = set().union(*(atoms(name["effect"], name["where"]) for name in names))
+    places = {place for _, place in out}
+    return {name for name in out if name[0] != without}, places
 
 
-def stated(numbers, draw):
-    constant, by_loss, no_law, temperature, identity = numbers
-    (loss, unknown), names, _, _ = draw
-    odds = constant + by_loss * loss + no_law * unknown
-    none = 1.0 / (1.0 + math.exp(-odds))
-    weight = lambda delta: math.exp(-(delta or identity) / (2.0 * max(temperature, 0.05)))
-    weights = [1.0] + [weight(delta) for delta, _ in names[1:]]
-    return none, [(1.0 - none) * weight / sum(weights) for weight in weights]
+def answers(folder):
+    """(whether its cause was left out, names that are right, places that are right, findings) of every diagnosis of a cause that is due."""
+    for path in sorted((folder / "sealed").glob("*.json")):
+        truth = json.loads(path.read_text())
+        wanted = [cause for cause in truth["effects"] if cause.get("wanted")]
+        if not wanted or wanted[0]["L"] < DUE:
+            continue
+        for out in [False, True]:
+            answer = folder / "verdicts" / ("left_out" if out else "") / path.name
+            if answer.exists():
+                right, places = known(truth, wanted[0]["effect"] if out else None)
+                yield wanted[0]["effect"], out, right, places, json.loads(answer.read_text())["findings"]
 
 
-def cost(numbers, all_draws):
-    total = 0.0
-    for draw in all_draws:
-        none, shares = stated(numbers, draw)
-        right = [share for share, (_, true) in zip(shares, draw[1]) if true]
-        total -= draw[3] * math.log(max(sum(right) if right else none, 1e-9))
-    return total / sum(draw[3] for draw in all_draws) + 1e-3 * sum(value * value for value in numbers[:3])
+def name_of_loads(finding):
+    """The name of a finding that takes up loads, stated or taken back; of warming only that of a stiffness."""
+    names = [finding["effect"]] + [rival["effect"] for rival in finding["rivals"] if rival["where"] == finding["where"]]
+    stiffness = any("stiffness" in number["name"] for number in finding["parameters"])
+    own = [name for name in names if name in OF_LOADS and (name != "joint_warming" or stiffness)]
+    return own[0] if own and finding["effect"] in OF_LOADS | {"unknown"} else None
 
 
-def minimum(function, start):
-    """Nelder and Mead (1965)."""
-    size = len(start)
-    simplex = [list(start)] + [[value + (0.5 if i == k else 0.0) for k, value in enumerate(start)] for i in range(size)]
-    scored = sorted((function(point), point) for point in simplex)
-    for _ in range(1500):
-        centre = [sum(point[k] for _, point in scored[:-1]) / size for k in range(size)]
-        worst = scored[-1][1]
-        along = lambda factor: [c + factor * (w - c) for c, w in zip(centre, worst)]
-        tried = along(-1.0)
-        value = function(tried)
-        if value < scored[0][0]:
-            further = along(-2.0)
-            best = function(further)
-            scored[-1] = (best, further) if best < value else (value, tried)
-        elif value < scored[-2][0]:
-            scored[-1] = (value, tried)
-        else:
-            inner = along(0.5)
-            value = function(inner)
-            if value < scored[-1][0]:
-                scored[-1] = (value, inner)
-            else:
-                best = scored[0][1]
-                shrunk = [[b + 0.5 * (p - b) for b, p in zip(best, point)] for _, point in scored]
-                scored = [(function(point), point) for point in shrunk]
-        scored.sort()
-    return scored[0]
+def statements(named, mimicry, temperature, identity):
+    """(weight, probability, right) of each finding with a name and of its rivals; `floor` is the least that its set states for none."""
+    least = min(max(UNLISTED * mimicry / (UNLISTED * mimicry + 1.0 - UNLISTED), MISLED), 1.0 - MISLED)
+    for out, right, finding, floor in named:
+        none = finding["none_probability"]
+        none = least if none <= floor + 1e-9 else max(none, least)
+        names = [(0.0, atoms(finding["effect"], finding["where"]))]
+        names += [(rival["delta_bic"], atoms(rival["effect"], rival["where"])) for rival in finding["rivals"]]
+        loss = lambda delta: identity if delta == 0.0 else max(delta, 0.0)
+        weights = [1.0] + [math.exp(-loss(delta) / (2.0 * temperature)) for delta, _ in names[1:]]
+        for weight, (_, name) in zip(weights, names):
+            yield (UNLISTED if out else 1.0 - UNLISTED), (1.0 - none) * weight / sum(weights), bool(name & right)
+
+
+def brier(all_statements):
+    all_statements = list(all_statements)
+    return sum(w * (p - right) ** 2 for w, p, right in all_statements) / sum(w for w, _, _ in all_statements)
 
 
 def main():
-    all_draws = [draw for argument in sys.argv[1:] for draw in draws(argument)]
-    value, numbers = minimum(lambda numbers: cost(numbers, all_draws), [1.0, -1.0, 1.0, 2.0, 4.0])
-    print(f"{len(all_draws)} findings, mean -ln likelihood {value:.4f}")
-    for name, number in zip(["NONE", "BY_LOSS", "NO_LAW", "TEMPERATURE", "IDENTITY"], numbers):
-        print(f"{name:12} {number:.3f}")
-    nowhere = [draw for draw in all_draws if not any(true for _, true in draw[1])]
-    if nowhere:
-        print(f"SAME_PLACE   {sum(draw[2] for draw in nowhere) / len(nowhere):.3f} of {len(nowhere)}")
-    said = []
-    for draw in all_draws:
-        _, shares = stated(numbers, draw)
-        said += [(share, true) for share, (_, true) in zip(shares, draw[1])]
-    ends = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0]
-    for low, high in zip(ends, ends[1:]):
-        own = [true for share, true in said if low <= share < high or share == high == 1.0]
-        if own:
-            print(f"{low:4} to {high:4}: {sum(own)} of {len(own)} = {100 * sum(own) / len(own):.1f} %")
-    print(f"Brier score {sum((share - true) ** 2 for share, true in said) / len(said):.4f}")
+    sets = [list(answers(Path(folder))) for folder in sys.argv[1:]]
+    every = [answer for one in sets for answer in one]
+    least = lambda one: min(finding["none_probability"] for *_, findings in one for finding in findings if finding["effect"] != "unknown")
+    floors = [least(one) for one in sets for _ in one]
+    named, of_loads = [], [0, 0]
+    for (_, out, right, _, findings), floor in zip(every, floors):
+        loads = [finding for finding in findings if name_of_loads(finding)]
+        several = loads if len(loads) > 1 else []
+        is_right = any(atoms(name_of_loads(finding), finding["where"]) & right for finding in several)
+        of_loads[out] += bool(several) and is_right != out
+        named += [(out, right, finding, floor) for finding in findings if finding["effect"] != "unknown" and finding not in several
+                  and finding["evidence"] and finding["evidence"]["delta_bic"] is not None]
+    if any(out for out, *_ in named):
+        grid = itertools.product([0.05 * k for k in range(1, 31)], [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0], [0.5, 1.0, 2.0, 4.0, 8.0])
+        score, best = min((brier(statements(named, *numbers)), numbers) for numbers in grid)
+        print(f"{len(named)} findings with a name: Brier score {score:.4f}")
+        for name, number in zip(["MIMICRY", "TEMPERATURE", "IDENTITY"], best):
+            print(f"{name:12} {number:.2f}")
+        said = list(statements(named, *best))
+        ends = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0]
+        for low, high in zip(ends, ends[1:]):
+            own = [one for one in said if low <= one[1] < high]
+            weight = sum(w for w, _, _ in own)
+            if own:
+                print(f"{low:4} to {high:4}: stated {sum(w * p for w, p, _ in own) / weight:.3f}, "
+                      f"right {sum(w * right for w, _, right in own) / weight:.3f} of {len(own)}")
+        print(f"MIMICRY_OF_LOADS {(of_loads[1] + 0.5) / (of_loads[0] + 0.5):.1f}: recordings with several names that take up loads, "
+              f"right with the whole list {of_loads[0]}, wrong without the cause {of_loads[1]}")
+    for title, alone in [("PLACED", True), ("PLACED_AMONG", False)]:
+        right, stated = [], 0.0
+        for effect, out, _, places, findings in every:
+            own = [finding for finding in findings if finding["effect"] == "unknown"]
+            if effect == "unknown" and not out and (len(own) == 1) == alone:
+                right += [any(place in places for _, place in atoms("unknown", finding["where"])) for finding in own]
+                stated += sum(finding["place_probability"] for finding in own)
+        if right:
+            print(f"{title:12} times {sum(right) / stated:.2f}: {sum(right)} of {len(right)} are right, stated are {stated:.1f}")
 
 
 main()

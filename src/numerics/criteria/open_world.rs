@@ -70,8 +70,14 @@ criteria! {
     /// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of
     /// names that were wrong where it was sure of them.
     MISLED: f64 = 0.02, "probability", "count: wrong names among sure ones of concealed recordings", "changes nothing on 2";
-    /// That a cause which is taken out of the list is called by another name with 0.9 or more.
-    MIMICRY: f64 = 0.2, "probability", "count: 32 of 164 concealed causes of L 50 or more", "";
+    /// That a law without a name acts at its place where it is the only one, beside what evidence says of it.
+    PLACED: f64 = 0.93, "probability", "measured by tests/reference/calibrate_probability.py", "";
+    /// The same where several laws without a name share the error: one effect may be split over places that are not its own.
+    PLACED_AMONG: f64 = 0.64, "probability", "measured by tests/reference/calibrate_probability.py", "";
+    /// How often a cause that is in no list is called by a name of the list that evidence is sure of, over how often one of the list is.
+    MIMICRY: f64 = 0.2, "ratio", "measured by tests/reference/calibrate_probability.py", "";
+    /// The same of several names that take up loads.
+    MIMICRY_OF_LOADS: f64 = 20.0, "ratio", "measured by tests/reference/calibrate_probability.py", "";
     /// What the criterion must lose without a name that stands beside a free form.
     SEEN: f64 = 10.0, "-2 ln of odds", "literature: very strong, Kass and Raftery (1995)", "";
     /// What a name that stands beside a free form must have of the evidence of all names there.

@@ -110,6 +110,11 @@ pub trait Cause: Sync {
         false
     }
 
+    /// Whether a form of it, with its like at other joints, takes up whatever else depends on loads.
+    fn takes_up_loads(&self, _form: &Form) -> bool {
+        false
+    }
+
     /// Whether its forms describe something that is in no list.
     fn is_nameless(&self) -> bool {
         false

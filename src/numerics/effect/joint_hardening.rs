@@ -103,6 +103,10 @@ impl Cause for JointHardening {
     fn yields_to_torque(&self) -> bool {
         true
     }
+
+    fn takes_up_loads(&self, _form: &Form) -> bool {
+        true
+    }
 }
 
 /// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;

@@ -176,35 +176,36 @@ impl Board {
         out.into_iter().map(|(kind, named)| (kind, Share::of(named))).collect()
     }
 
+    /// Held-out errors of recordings with a due effect.
+    fn held_out_of_due(&self) -> impl Iterator<Item = HeldOut> {
+        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
+        due.filter_map(|case| case.held_out)
+    }
+
     /// Held-out errors over their bounds, ascending, where an effect is due, and in recordings without one.
     pub fn ratios(&self) -> [Vec<f64>; 2] {
-        let due = |case: &&Case| case.causes.iter().any(|cause| cause.strength >= DUE);
-        let null = |case: &&Case| case.causes.is_empty();
-        let sorted = |cases: Vec<&Case>| {
-            let mut out: Vec<f64> = cases.iter().filter_map(|case| Some(case.held_out?.ratio())).collect();
+        let nulls = self.cases.iter().filter(|case| case.causes.is_empty()).filter_map(|case| case.held_out);
+        let sorted = |all: Vec<HeldOut>| {
+            let mut out: Vec<f64> = all.iter().map(HeldOut::ratio).collect();
             out.sort_by(f64::total_cmp);
             out
         };
-        [sorted(self.cases.iter().filter(due).collect()), sorted(self.cases.iter().filter(null).collect())]
+        [sorted(self.held_out_of_due().collect()), sorted(nulls.collect())]
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before.
     pub fn worse(&self) -> Share {
-        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
-        Share::of(due.filter_map(|case| case.held_out.map(|held_out| held_out.after > held_out.before)))
+        Share::of(self.held_out_of_due().map(|held_out| held_out.after > held_out.before))
     }
 
     /// Recordings with a due effect whose held-out error is larger with the findings than before, and than its bound.
     pub fn worse_than_bound(&self) -> Share {
-        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
-        let is_worse = |held_out: HeldOut| held_out.after > held_out.before.max(held_out.bound);
-        Share::of(due.filter_map(|case| case.held_out.map(is_worse)))
+        Share::of(self.held_out_of_due().map(|held_out| held_out.after > held_out.before.max(held_out.bound)))
     }
 
     /// Explained shares of held-out errors where an effect is due, ascending.
     pub fn explained(&self) -> Vec<f64> {
-        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
-        let mut out: Vec<f64> = due.filter_map(|case| case.held_out?.explained()).collect();
+        let mut out: Vec<f64> = self.held_out_of_due().filter_map(|held_out| held_out.explained()).collect();
         out.sort_by(f64::total_cmp);
         out
     }

@@ -44,7 +44,9 @@ pub fn left_out(truth: &Truth, whole: &Answer, without: &Answer) -> Option<LeftO
     let places = truth.accepted.iter().chain(&cause.same).map(|name| name.place.as_str()).chain([cause.place.as_str()]);
     known.extend(places.flat_map(|place| atoms(NAMELESS, place)));
     known.extend(truth.tampered.iter().flat_map(|fault| atoms(&fault.effect, &fault.place)));
-    known.extend(truth.effects.iter().filter(|other| !other.wanted).flat_map(|other| atoms(&other.effect, &other.place)));
+    // What else is concealed is no wrong name, wanted or not.
+    let others = truth.effects.iter().filter(|other| other.effect != cause.effect);
+    known.extend(others.flat_map(|other| atoms(&other.effect, &other.place)));
     let right: Vec<Atoms> = known.iter().map(|name| BTreeSet::from([name.clone()])).collect();
     let said = without.findings.iter().filter(|finding| finding.effect != NAMELESS);
     let wrong = said.filter(|finding| atoms(&finding.effect, &finding.place).is_disjoint(&known));
@@ -121,6 +123,16 @@ mod tests {
         .expect("a truth");
         let whole = answer("explained", 0.1, &json!([{ "effect": "backlash", "where": "joint 2", "probability": 0.9 }]));
         let judge = |verdict, rms, findings: Value| left_out(&truth, &whole, &answer(verdict, rms, &findings)).expect("a mark");
+        let beside: Truth = serde_json::from_value(json!({
+            "case": "c", "content": "single", "family": "payload_error", "robot": "r", "tampered": [], "points": { "fit": 50, "validate": 20 },
+            "accepted": [],
+            "effects": [{ "effect": "payload_error", "where": "tool", "form": "mass", "L": 80.0, "parameters": [], "wanted": true },
+                { "effect": "joint_compliance", "where": "joint 2", "form": "mass", "L": 900.0, "parameters": [], "wanted": true }],
+        }))
+        .expect("a truth");
+        let true_name = json!([{ "effect": "joint_compliance", "where": "joint 2", "probability": 0.9 }]);
+        let mark = left_out(&beside, &whole, &answer("unexplained", 0.3, &true_name)).expect("a mark");
+        assert!(mark.effect == "payload_error" && mark.wrong.is_none(), "what is there is no wrong name");
         let unknown = judge("unexplained", 0.12, json!([{ "effect": "unknown", "where": "joint 2", "probability": 0.8 }]));
         assert!(unknown.tells && unknown.wrong.is_none() && unknown.statements.iter().all(|one| one.right));
         let accepted = judge("explained", 0.1, json!([{ "effect": "joint_hardening", "where": "joint 2", "probability": 0.95 }]));

@@ -50,6 +50,16 @@ pub struct Bin {
 /// Ends of the bins.
 const ENDS: [f64; 8] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95];
 
+/// The bins from their lower to their upper ends.
+pub(super) fn ends() -> impl Iterator<Item = [f64; 2]> {
+    ENDS.iter().zip(ENDS[1..].iter().chain([&1.0])).map(|(from, to)| [*from, *to])
+}
+
+/// Whether a probability lies in a bin; the last one holds its upper end.
+pub(super) fn within(probability: f64, [from, to]: [f64; 2]) -> bool {
+    probability >= from && (probability < to || to == 1.0)
+}
+
 /// What findings say with a probability, against the names that are `true_names`, and those that are `accepted` where a finding has none of
 /// these.
 pub(super) fn statements(findings: &[Finding], true_names: &[Atoms], accepted: &[Atoms]) -> Vec<Statement> {
@@ -84,13 +94,11 @@ pub struct Reliability {
 /// The reliability of statements of one subject.
 pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, subject: Subject) -> Reliability {
     let all: Vec<&Statement> = statements.filter(|statement| statement.subject == subject).collect();
-    let ends = ENDS.iter().zip(ENDS[1..].iter().chain([&1.0]));
-    let bins = ends.filter_map(|(from, to)| {
-        let within = |s: &&&Statement| s.probability >= *from && (s.probability < *to || *to == 1.0);
-        let own: Vec<&&Statement> = all.iter().filter(within).collect();
+    let bins = ends().filter_map(|[from, to]| {
+        let own: Vec<&&Statement> = all.iter().filter(|s| within(s.probability, [from, to])).collect();
         let stated = own.iter().map(|s| s.probability).sum::<f64>() / own.len() as f64;
         let right = Share::of(own.iter().map(|s| s.right));
-        (!own.is_empty()).then_some(Bin { from: *from, to: *to, stated, right })
+        (!own.is_empty()).then_some(Bin { from, to, stated, right })
     });
     let miss = |s: &&Statement| (s.probability - f64::from(u8::from(s.right))).powi(2);
     let brier = (!all.is_empty()).then(|| all.iter().map(miss).sum::<f64>() / all.len() as f64);

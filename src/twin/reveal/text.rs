@@ -1,6 +1,7 @@
 //! The scoreboard for people and for programs.
 
 use super::board::{BINS, Board, Company, Counts, NEAR_BOUND};
+use super::both_worlds::{MixedBin, UNLISTED};
 use super::left_out::LeftOutShares;
 use super::mark::{Case, DUE};
 use super::place::{GIVEN, Places};
@@ -145,6 +146,13 @@ impl Board {
         }
         if !self.left_out.is_empty() {
             tell_reliability(out, "names where the data cannot tell", &self.untold_reliability());
+            for unlisted in UNLISTED {
+                let _ = writeln!(out, "\nstated probabilities of names where {unlisted} of all causes are in no list");
+                let _ = writeln!(out, "  from  to    stated  right   statements with the whole list, and without the cause");
+                for MixedBin { from, to, stated, right, statements: [listed, without] } in self.mixed_reliability(unlisted) {
+                    let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {right:.3}   {listed:>4}  {without:>4}");
+                }
+            }
         }
     }
 
@@ -211,11 +219,17 @@ impl Board {
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
             "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
             "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()), "due_worse": share(&self.worse()), "due_worse_than_bound": share(&self.worse_than_bound()) },
-            "left_out": { "recordings": self.left_out.len(), "worlds": left_out, "reliability": reliable("names where the data cannot tell", self.untold_reliability()) },
+            "left_out": { "recordings": self.left_out.len(), "worlds": left_out, "reliability": reliable("names where the data cannot tell", self.untold_reliability()),
+                "both_worlds": UNLISTED.map(|unlisted| json!({ "unlisted": unlisted, "bins": self.mixed_reliability(unlisted).iter().map(mixed_bin).collect::<Vec<_>>() })) },
             "explained_share": spread(&self.explained()),
             "failures": self.failures().map(failure).collect::<Vec<_>>(),
         })
     }
+}
+
+fn mixed_bin(bin: &MixedBin) -> Value {
+    let MixedBin { from, to, stated, right, statements: [listed, without] } = bin;
+    json!({ "from": from, "to": to, "stated": stated, "right": right, "statements_whole_list": listed, "statements_left_out": without })
 }
 
 /// Stated probabilities against what was true.

@@ -118,7 +118,7 @@ const STATEMENTS: [&str; 14] = [
      link masses, yet gravity loads joints in these poses (10 rows of 80 carry a payload).",
     "Something unknown acts at joint 2: gear_cyclic fits best (the transmission or encoder of joint 2 errs periodically with its angle: 3 times a turn by 15 \
      arcsec), but its size depends on the load of joint 2 and the time (31 um rms at the tool).",
-    "A cause that is in no list acts at link 2-3 (probability 0.97); the nearest of the list explains 83 % of it: link 2-3 bends under what it carries by \
+    "What acts at link 2-3 is in no list (probability 0.97); the nearest of the list explains 83 % of it: link 2-3 bends under what it carries by \
      1.2e-7 rad/Nm (31 um rms at the tool).",
     "Not accepted: the set-up is wrong: joints 1, 4, 6 turn the other way than the robot file says; with this error the nominal robot is 783 mm off the points \
      (median, base and tool fitted), without it 1.2 mm. Remedy: in `ingest`: `columns: {q: {.., sign: [-1, 1, 1, -1, 1, -1]}}`, or turn the axes round in the \

@@ -8,7 +8,7 @@ use super::names::{
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use crate::criteria::open_world::{LOUDER, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
+use crate::criteria::open_world::{LOUDER, MIMICRY_OF_LOADS, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -160,10 +160,24 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         &form.terms[..form.terms.len().min(own + 1)]
     }
 
-    /// The odds of a finding; of a weak name none of the list is right but for what evidence misleads.
+    /// The odds of a finding; of a weak name none of the list is right but for what evidence misleads, and several names that take up loads
+    /// are as a rule what one cause leaves that nobody listed.
     pub fn odds(&self, key: &FindingKey, own: &ContestedName) -> NameOdds {
-        let none = if self.is_weak(key, own) { 1.0 - *MISLED } else { own.odds.none };
+        let none = match self.is_weak(key, own) {
+            true => 1.0 - *MISLED,
+            false if self.is_one_of_several_of_loads(&own.members) => own.odds.none.max(self.case().least(*MIMICRY_OF_LOADS)),
+            false => own.odds.none,
+        };
         NameOdds { none, ..own.odds }
+    }
+
+    fn is_one_of_several_of_loads(&self, members: &[usize]) -> bool {
+        let takes_up = |cause: &usize| {
+            let form = &self.sight.judged.state.causes[*cause].form;
+            form.cause().takes_up_loads(form)
+        };
+        let findings = self.findings.values().filter(|members| members.iter().any(takes_up));
+        members.iter().any(takes_up) && findings.count() > 1
     }
 
     fn is_nameless(&self, cause: usize) -> bool {

@@ -150,7 +150,7 @@ impl NameCase<'_, '_, '_, '_> {
             |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
         let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
         let odds = NameOdds {
-            none: (logs(&free) - all).exp().clamp(self.least(), 1.0 - *MISLED),
+            none: (logs(&free) - all).exp().clamp(self.least(*MIMICRY), 1.0 - *MISLED),
             place: (log_sum(&[here(&names), here(&free)]) - all).exp(),
             log: own.log,
             share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
@@ -173,8 +173,8 @@ impl NameCase<'_, '_, '_, '_> {
     }
 
     /// The least probability that it is none of the list: what the list lacks looks like a law of it at times, and no evidence tells.
-    fn least(&self) -> f64 {
-        let mimicry = self.open_world * *MIMICRY;
+    pub fn least(&self, mimicry: f64) -> f64 {
+        let mimicry = self.open_world * mimicry;
         (mimicry / (mimicry + 1.0 - self.open_world)).clamp(*MISLED, 1.0 - *MISLED)
     }
 

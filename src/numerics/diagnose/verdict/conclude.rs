@@ -4,6 +4,7 @@ use super::faults::stand_out_in_number;
 use super::findings::findings;
 use super::last_round::LastRound;
 use super::not_observable::{next, not_observable, not_tried};
+use super::probability::weigh_places;
 use super::unseen::unseen;
 use crate::criteria::judge::FOLDS;
 use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE, REPEATS};
@@ -35,7 +36,8 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let left_at_fitted_rows =
         structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE || many_aside;
     let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
-    let (rest, findings) = without_small_rests(findings(&last, left_at_fitted_rows));
+    let (rest, mut findings) = without_small_rests(findings(&last, left_at_fitted_rows));
+    weigh_places(&mut findings);
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {

@@ -4,7 +4,7 @@
 //! proportion to exp(-criterion / 2 T): the criterion is -2 ln of a posterior whose noise is the residual's, so T is 1 for forms that are
 //! right; true shapes differ a little from the library's, which T allows for (`tests/reference/calibrate_probability.py`).
 
-use crate::criteria::open_world::MISLED;
+use crate::criteria::open_world::{MISLED, PLACED, PLACED_AMONG};
 use crate::criteria::words::{FAULT, IDENTITY, TEMPERATURE};
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::types::{Finding, Probabilities, RivalCause};
@@ -26,6 +26,21 @@ pub(super) fn weigh(finding: &mut Finding, odds: &NameOdds, rejected: bool) {
         rival.probability = (1.0 - odds.none) * weight(rival) / whole;
     }
     finding.probabilities = Probabilities { name: (1.0 - odds.none) / whole, place: odds.place, none: odds.none };
+}
+
+/// Lowers the probabilities of the places of findings without a name: evidence knows free forms at places, and errs more often where several
+/// share what one effect does. What is elsewhere is no longer what the finding says.
+pub(super) fn weigh_places(findings: &mut [Finding]) {
+    let is_nameless = |finding: &Finding| finding.effect == names::UNKNOWN;
+    let count = findings.iter().filter(|finding| is_nameless(finding)).count();
+    let most = if count > 1 { *PLACED_AMONG } else { *PLACED };
+    for finding in findings.iter_mut().filter(|finding| is_nameless(finding)) {
+        let Probabilities { name, place, none } = &mut finding.probabilities;
+        *place *= most;
+        let all = *name + *none;
+        *name *= *place;
+        *none = all - *name;
+    }
 }
 
 /// The weight of a rival beside a name whose weight is 1; only identities differ by nothing at all.
@@ -86,6 +101,29 @@ mod tests {
         weigh(&mut found, &odds, false);
         let sum: f64 = found.rivals.iter().map(|rival| rival.probability).sum();
         assert!((found.probabilities.name - 0.2).abs() < 1e-12 && (sum - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_place_without_a_name_is_less_sure_among_several() {
+        let nameless = || {
+            let mut out = finding(200.0, &[]);
+            out.effect = names::UNKNOWN;
+            out.probabilities = Probabilities { name: 0.75, place: 1.0, none: 0.0 };
+            out
+        };
+        let mut named = finding(200.0, &[]);
+        named.probabilities.place = 1.0;
+        let places = |mut findings: Vec<Finding>| {
+            weigh_places(&mut findings);
+            findings.iter().map(|finding| finding.probabilities.place).collect::<Vec<_>>()
+        };
+        let mut alone = [nameless()];
+        weigh_places(&mut alone);
+        let Probabilities { name, place, none } = alone[0].probabilities;
+        assert_eq!((name, place), (0.75 * *PLACED, *PLACED));
+        assert!((name + none - 0.75).abs() < 1e-12, "rivals have what they had");
+        assert_eq!(places(vec![named.clone(), nameless()]), [1.0, *PLACED]);
+        assert_eq!(places(vec![nameless(), named, nameless()]), [*PLACED_AMONG, 1.0, *PLACED_AMONG]);
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(crate) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> S
 /// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
 pub(crate) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
     let holds = if share < 0.995 { format!(" explains {:.0} % of it", 100.0 * share) } else { " comes close".into() };
-    format!("a cause that is in no list acts at {place} (probability {none:.2}); the nearest of the list{holds}: {nearest}")
+    format!("what acts at {place} is in no list (probability {none:.2}); the nearest of the list{holds}: {nearest}")
 }
 
 /// The sentence of a finding whose name the user has excluded.

@@ -52,14 +52,14 @@ pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
     let form = form(&courses);
     // Time only goes on, and so does the temperature of these recordings: what jumps with them does so once and for good.
     let passes = |course: &ForeignCourse| matches!(course.over, ForeignVariable::Time | ForeignVariable::Temperature);
-    let steps = matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
+    let is_step = matches!(&courses[..], [one] if passes(one) && matches!(one.shape, ForeignShape::Jumps(_)));
     let effect = Physical::Foreign(Foreign { motion, seat, direction, size, courses });
     let (place, same) = places(bench, motion, seat);
     let all: Vec<String> = std::iter::once(place.clone()).chain(same.clone()).collect();
     let draft = Draft::new(form, vec![sized("unknown", place, vec![effect])]).needing(&columns);
     let draft = same.into_iter().fold(draft, |draft, place| draft.accepting("unknown", place));
-    let steps = steps.then(|| all.into_iter().filter_map(|place| Some((step(motion, &place)?, place))));
-    steps.into_iter().flatten().fold(draft, |draft, (name, place)| draft.accepting(name, place))
+    let names = is_step.then(|| all.into_iter().filter_map(|place| Some((step(motion, &place)?, place))));
+    names.into_iter().flatten().fold(draft, |draft, (name, place)| draft.accepting(name, place))
 }
 
 /// The name of what moves at a place so, once and for good, if there is one.
@@ -74,8 +74,7 @@ fn step(motion: ForeignMotion, place: &str) -> Option<&'static str> {
 /// The joint or link that moves: not the last joint's turn, which hardly moves the tool, and links with a length.
 fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
     match motion {
-        ForeignMotion::JointTurn => bench.turning(draw),
-        ForeignMotion::JointShift | ForeignMotion::JointTilt => bench.turning(draw),
+        ForeignMotion::JointTurn | ForeignMotion::JointShift | ForeignMotion::JointTilt => bench.turning(draw),
         ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
             let long = bench.long_links();
             long.get(draw.index(long.len())).copied().unwrap_or(1)
