@@ -52,6 +52,8 @@ criteria! {
     /// ln of the evidence of a free form beside everything, over the number of places, above which it joins; and by which one
     /// is better than all causes together where it stands in their place.
     STRONG: f64 = 3.0, "ln of evidence", "literature: strong, Jeffreys (1961)", "changes nothing on 1";
+    /// The same where no free form is in the model yet: false ones of a few micrometres.
+    FIRST: f64 = 6.0, "ln of evidence", "count: of 150 recordings that conceal nothing 3 had one by 3, and 2 by 6", "";
     /// ln of what each cause's size costs beside a known one.
     SIZE: f64 = 3.0, "ln of evidence", "judgement: a size is one of some twenty on the grid", "changes nothing on 1";
     /// What goes may cost this share of the folds' rms.

@@ -8,7 +8,7 @@ use super::names::{
 };
 use super::state::{CauseColumns, KnownCauses};
 use super::step::{ModelChange, ModelStep};
-use crate::criteria::open_world::{LOUDER, MIMICRY_OF_LOADS, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
+use crate::criteria::open_world::{FIRST, LOUDER, MIMICRY_OF_LOADS, MISLED, SEEN, SHARED, SIZE, STRONG, WORSE};
 use crate::diagnose::finding_groups::{FindingGroups, FindingKey, groups};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
@@ -118,7 +118,9 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// A law of the list or the free form of a place beside everything.
     pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
         let price = (self.beside.logs.len().max(1) as f64).ln();
-        let strong = || self.beside.best.iter().filter(|form| form.log - price > *STRONG && !refused.contains(&form.place));
+        let is_first = (0..self.sight.judged.set.len()).all(|i| !self.is_nameless(i));
+        let least = price + if is_first { *FIRST } else { *STRONG };
+        let strong = || self.beside.best.iter().filter(|form| form.log > least && !refused.contains(&form.place));
         let first = |form: &FreeForm| form.terms.first().map_or(f64::NEG_INFINITY, |term| term.log);
         let form = strong().max_by(|a, b| first(a).total_cmp(&first(b)))?;
         let whole = strong().max_by(|a, b| a.log.total_cmp(&b.log))?;
