@@ -26,10 +26,6 @@ pub struct CompletedRun {
 }
 
 impl CompletedRun {
-    /// The tables of a kind, in pipeline order.
-    pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
-        self.manifest.tables(kind)
-    }
     /// Whether every stage was cached.
     pub fn nothing_done(&self) -> bool {
         self.manifest.stages.iter().all(|stage| stage.status == StageStatus::Cached)

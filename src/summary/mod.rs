@@ -50,5 +50,5 @@ use crate::table::Table;
 
 /// All tables of a kind that a run wrote. Fails where one has left the store.
 fn tables<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<Vec<T>> {
-    outcome.tables(T::KIND).map(|output| T::from_frame(&store.load(&output.table)?)).collect()
+    outcome.manifest.tables(T::KIND).map(|output| T::from_frame(&store.load(&output.table)?)).collect()
 }

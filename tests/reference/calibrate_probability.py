@@ -81,7 +81,8 @@ def brier(all_statements):
 def main():
     sets = [list(answers(Path(folder))) for folder in sys.argv[1:]]
     every = [answer for one in sets for answer in one]
-    least = lambda one: min(finding["none_probability"] for *_, findings in one for finding in findings if finding["effect"] != "unknown")
+    stated = lambda one: [finding["none_probability"] for *_, findings in one for finding in findings if finding["effect"] != "unknown"]
+    least = lambda one: min(stated(one), default=0.0)
     floors = [least(one) for one in sets for _ in one]
     named, of_loads = [], [0, 0]
     for (_, out, right, _, findings), floor in zip(every, floors):

@@ -77,7 +77,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
 }
 
 fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
-    let last = outcome.tables(T::KIND).last();
+    let last = outcome.manifest.tables(T::KIND).last();
     let output = last.ok_or_else(|| Error::Bug(format!("a simulation without a table {}", T::KIND)))?;
     T::from_frame(&store.load(&output.table)?)
 }

@@ -165,10 +165,12 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// The odds of a finding; of a weak name none of the list is right but for what evidence misleads, and several names that take up loads
     /// are as a rule what one cause leaves that nobody listed.
     pub fn odds(&self, key: &FindingKey, own: &ContestedName) -> NameOdds {
-        let none = match self.is_weak(key, own) {
-            true => 1.0 - *MISLED,
-            false if self.is_one_of_several_of_loads(&own.members) => own.odds.none.max(self.case().least(*MIMICRY_OF_LOADS)),
-            false => own.odds.none,
+        let none = if self.is_weak(key, own) {
+            1.0 - *MISLED
+        } else if self.is_one_of_several_of_loads(&own.members) {
+            own.odds.none.max(self.case().least(*MIMICRY_OF_LOADS))
+        } else {
+            own.odds.none
         };
         NameOdds { none, ..own.odds }
     }
