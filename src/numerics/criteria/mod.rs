@@ -13,6 +13,7 @@ mod criterion;
 mod scaled;
 mod table;
 
+pub mod cells;
 pub mod choose;
 pub mod closed_form;
 pub mod effect;
@@ -31,6 +32,7 @@ pub use table::CriterionRow;
 
 /// All tables.
 pub const TABLES: &[&[CriterionRow]] = &[
+    cells::ROWS,
     choose::ROWS,
     closed_form::ROWS,
     effect::ROWS,
@@ -62,6 +64,7 @@ pub fn scale(name: &str, factor: CriterionFactor) -> bool {
 #[cfg(feature = "ablate")]
 fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable)> {
     let rooms = [
+        cells::SCALABLE,
         choose::SCALABLE,
         closed_form::SCALABLE,
         effect::SCALABLE,

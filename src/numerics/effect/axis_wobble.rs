@@ -2,7 +2,7 @@
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::{
-    Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term, Variable, about,
+    AxisPoint, Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term, Variable, about,
     names,
 };
 use crate::criteria::effect::{RARE, WOBBLES};
@@ -12,8 +12,10 @@ use crate::units::Unit;
 /// An axis that tilts with its own angle.
 pub struct AxisWobble;
 
-/// No bearing lets an axis tilt further, rad (100 arcsec).
-const LARGEST: f64 = 5e-4;
+/// No bearing lets an axis tilt further, rad (400 arcsec).
+const LARGEST: f64 = 2e-3;
+/// Points of the axis that are nearer to each other (m) are one.
+const NEAR: f64 = 0.02;
 
 impl Cause for AxisWobble {
     about! {
@@ -30,13 +32,20 @@ impl Cause for AxisWobble {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let last = survey.joints() - 1;
         let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| {
+            let own = survey.robot.point(joint);
+            let far = move |at: &AxisPoint| *at == AxisPoint::Own || (at.of(survey.robot, joint) - own).norm() > NEAR;
+            let points = [AxisPoint::Own, AxisPoint::Next, AxisPoint::Before].into_iter().filter(far);
             let orders = [1, 2].into_iter().flat_map(|order| [(order, true), (order, false)]);
-            orders.flat_map(move |(order, turning)| {
+            let ways = points.flat_map(move |at| orders.clone().map(move |(order, turning)| (at, order, turning)));
+            ways.flat_map(move |(at, order, turning)| {
                 let law = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
-                [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
+                let odds = if at == AxisPoint::Own { 0.0 } else { *RARE };
+                [None, Some(0), Some(1)]
+                    .map(|about| (Term::new(&Self, Motion::Axis { joint, about, turning, at }, law), odds))
             })
         });
-        forms.map(|form| Hypothesis::new(form, *WOBBLES).penalised(*RARE).within(LARGEST)).collect()
+        let one = |(form, odds): (Term, f64)| Hypothesis::new(form, *WOBBLES).penalised(*RARE + odds).within(LARGEST);
+        forms.map(one).collect()
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

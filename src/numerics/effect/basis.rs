@@ -42,7 +42,16 @@ pub enum Basis {
         /// How many cosines.
         count: usize,
     },
-    /// The same, fading out beyond either end within one wave of the highest cosine, and straight across gaps.
+    /// The same with its mean: k = 0..count.
+    Series {
+        /// Lower end of the support.
+        low: f64,
+        /// Upper end of the support.
+        high: f64,
+        /// How many functions, the constant among them.
+        count: usize,
+    },
+    /// The cosines, fading out beyond either end within one wave of the highest cosine, and straight across gaps.
     Fading {
         /// Lower end of the support.
         low: f64,
@@ -205,7 +214,7 @@ impl Basis {
             Self::Straight { .. } => 2,
             Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
             Self::Sway { .. } => 2,
-            Self::Cosines { count, .. } | Self::Fading { count, .. } => *count,
+            Self::Cosines { count, .. } | Self::Series { count, .. } | Self::Fading { count, .. } => *count,
             Self::Steps { knots } => knots.count + 1,
             Self::Corners { knots } => knots.count,
             _ => 1,
@@ -214,7 +223,10 @@ impl Basis {
 
     /// Whether it is a free curve.
     pub fn is_curve(&self) -> bool {
-        matches!(self, Self::Cosines { .. } | Self::Fading { .. } | Self::Steps { .. } | Self::Corners { .. })
+        matches!(
+            self,
+            Self::Cosines { .. } | Self::Series { .. } | Self::Fading { .. } | Self::Steps { .. } | Self::Corners { .. }
+        )
     }
 
     /// The values of its functions at `u`, numbered.
@@ -239,6 +251,10 @@ impl Basis {
             }
             Self::Cosines { low, high, count } => {
                 cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value))
+            }
+            Self::Series { low, high, count } => {
+                each(0, 1.0);
+                cosines(u, [low, high], count.saturating_sub(1)).enumerate().for_each(|(k, value)| each(k + 1, value));
             }
             Self::Fading { low, high, count, gaps } => {
                 let wave = 2.0 * (high - low) / count as f64;

@@ -1,7 +1,7 @@
 //! Laws of frames that no cause of the list has: the base, the tool and the axes of joints, by what a recording offers.
 
 use super::interactions::slow;
-use super::{Axes, Basis, Law, Motion, Survey, Variable};
+use super::{Axes, AxisPoint, Basis, Law, Motion, Survey, Variable};
 use crate::criteria::effect::RARE;
 
 /// Cosines of a slow course.
@@ -28,7 +28,7 @@ pub(super) fn laws(survey: &Survey) -> Vec<(Motion, Law, usize, f64)> {
     }
     for joint in revolute().filter(|joint| joint + 1 < joints) {
         for turning in [true, false] {
-            let motion = Motion::Axis { joint, about: None, turning };
+            let motion = Motion::Axis { joint, about: None, turning, at: AxisPoint::Own };
             let loaded = survey
                 .is_loaded(joint)
                 .then(|| Law::new(Variable::Load { joint }, Basis::Linear { zero: 0.0, per: survey.load(joint) }));

@@ -3,8 +3,8 @@
 use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
-    Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about, names,
-    orders,
+    Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about,
+    figure, names, orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
 use crate::robot::RobotModel;
@@ -17,6 +17,8 @@ pub struct GearCyclic;
 const ORDERS: u32 = 48;
 /// Eccentricity makes the lowest orders on any joint; they are tried as a few, all others as many.
 const LOW: u32 = 4;
+/// Below this order those between whole ones are tried, too.
+const BETWEEN: u32 = 20;
 
 impl GearCyclic {
     /// The error of one order per turn of a joint; with its overtone, twice the order, as an eccentric wheel or disc has it.
@@ -48,7 +50,28 @@ impl Cause for GearCyclic {
                 [Some(pure), wheel].into_iter().flatten().map(|hypothesis| hypothesis.within(orders::BEYOND))
             })
         });
-        forms.collect()
+        // Orders of gears with a fraction of a turn: half ones to begin with.
+        let joints = survey.revolute();
+        let between = joints.flat_map(|joint| {
+            let travel = survey.travel(joint);
+            let orders = (1..BETWEEN).map(|order| f64::from(order) + 0.5).filter(move |order| orders::is_within(*order, travel));
+            let term = move |order| {
+                Term::new(&Self, Motion::Joint { joint }, Law::new(Variable::Angle { joint }, orders::of_order(order)))
+            };
+            orders.map(move |order| Hypothesis::new(term(order), ORDERS as usize).penalised(*UNCOMMON).within(orders::BEYOND))
+        });
+        forms.chain(between).collect()
+    }
+
+    /// Orders in between: a gear stage need not be in phase with its joint.
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        let (Motion::Joint { joint }, Some(order)) = (term.motion(), orders::order(term.basis())) else { return Vec::new() };
+        if matches!(term.basis(), Basis::Wave { overtone: true, .. }) {
+            return Vec::new();
+        }
+        let step = 0.25 * libm::exp2(-f64::from(level));
+        let orders = [order - step, order + step].into_iter().filter(|order| orders::is_within(*order, survey.travel(joint)));
+        term.with_bases(orders.map(orders::of_order))
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
@@ -80,8 +103,11 @@ impl Cause for GearCyclic {
 
 /// An order and its amplitude in words.
 fn order(term: &Term, numbers: &[&ParameterEstimate]) -> String {
-    let Basis::Wave { order, .. } = term.basis() else { return String::new() };
-    let overtone =
-        numbers.get(2..).filter(|pair| pair.len() >= 2).map(|pair| format!(" and {} times by {}", 2 * order, amplitude(pair)));
+    let Some(order) = orders::order(term.basis()) else { return String::new() };
+    let overtone = numbers
+        .get(2..)
+        .filter(|pair| pair.len() >= 2)
+        .map(|pair| format!(" and {} times by {}", 2.0 * order, amplitude(pair)));
+    let order = figure(order, if order.fract().abs() < 1e-9 { 0 } else { 2 });
     format!("{order} times a turn by {}{}", amplitude(numbers), overtone.unwrap_or_default())
 }

@@ -95,7 +95,7 @@ pub use joint_log_lag::JointLogLag;
 pub use joint_table::JointTable;
 pub use law::{Factor, Law};
 pub use link_compliance::LinkCompliance;
-pub use motion::{Axes, Motion};
+pub use motion::{Axes, AxisPoint, Motion};
 pub use parts::{FittedForms, HiddenSize, ModelledFinding, NamedForms};
 pub use place::Place;
 pub use placed_row::{PlacedRow, PlacementBuffers};

@@ -32,6 +32,9 @@ pub enum Motion {
         about: Option<usize>,
         /// Whether it turns with the joint.
         turning: bool,
+        /// About which point of the axis.
+        #[serde(default, skip_serializing_if = "AxisPoint::is_own")]
+        at: AxisPoint,
     },
     /// A joint is displaced along its axis or across it, the link before carrying the directions.
     Slide {
@@ -74,6 +77,37 @@ pub enum Motion {
     },
 }
 
+/// The point of a joint's axis about which it tilts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisPoint {
+    /// The joint's own.
+    #[default]
+    Own,
+    /// The one nearest to the next joint, or to the tool.
+    Next,
+    /// The one nearest to the joint before.
+    Before,
+}
+
+impl AxisPoint {
+    fn is_own(&self) -> bool {
+        *self == Self::Own
+    }
+
+    /// Where it is, m, zero pose.
+    pub(crate) fn of(self, robot: &RobotModel, joint: usize) -> Vector3<f64> {
+        let (own, axis) = (robot.point(joint), robot.axis(joint));
+        let other = match self {
+            Self::Own => *own,
+            Self::Next if joint + 1 < robot.joints() => *robot.point(joint + 1),
+            Self::Next => robot.home().translation,
+            Self::Before => joint.checked_sub(1).map_or(*own, |before| *robot.point(before)),
+        };
+        own + axis * axis.dot(&(other - own))
+    }
+}
+
 /// Directions of a frame's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -93,6 +127,11 @@ impl Axes {
             Self::Rotation => 3..6,
             Self::Both => 0..6,
         }
+    }
+
+    /// How many they are.
+    pub(crate) fn count(self) -> usize {
+        self.range().len()
     }
 
     /// Name, unit and usual size of each.
@@ -164,12 +203,12 @@ impl Motion {
     ) {
         match *self {
             Self::Joint { joint } | Self::Coupled { moved: joint, .. } => out.turn(k, p, joint, value),
-            Self::Axis { joint, about, turning } => {
+            Self::Axis { joint, about, turning, at } => {
                 let normals = robot.normals(joint).iter().enumerate();
-                let station = if turning { joint + 1 } else { joint };
+                let (station, point) = (if turning { joint + 1 } else { joint }, at.of(robot, joint));
                 let chosen = normals.filter(|(axis, _)| about.is_none_or(|about| about == *axis)).map(|(_, normal)| normal);
                 for (i, (_, normal)) in chosen.enumerate() {
-                    out.shift(count * i + k, p, station, screw(normal, robot.point(joint)) * value);
+                    out.shift(count * i + k, p, station, screw(normal, &point) * value);
                 }
             }
             Self::Slide { joint, along } => {

@@ -3,6 +3,7 @@
 use super::summary::amplitude;
 use super::{Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::units::Unit;
+use std::f64::consts::TAU;
 
 /// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
 const PHASE: f64 = 2.2;
@@ -14,6 +15,30 @@ pub(super) const BEYOND: f64 = 5e-3;
 /// A sine and a cosine of `order` times the variable.
 pub(super) fn wave(of: Variable, order: u32) -> Law {
     Law::new(of, Basis::Wave { order, overtone: false })
+}
+
+/// A sine and a cosine of any order: of whole periods a turn, or not.
+pub(super) fn of_order(order: f64) -> Basis {
+    let whole = order.round();
+    if (order - whole).abs() < 1e-9 && whole >= 1.0 {
+        Basis::Wave { order: whole as u32, overtone: false }
+    } else {
+        Basis::Sway { period: TAU / order }
+    }
+}
+
+/// Periods a turn of a sine and a cosine; none of another basis.
+pub(super) fn order(basis: Basis) -> Option<f64> {
+    match basis {
+        Basis::Wave { order, .. } => Some(f64::from(order)),
+        Basis::Sway { period } => Some(TAU / period),
+        _ => None,
+    }
+}
+
+/// Whether a joint of this travel (rad) shows more of an order than a line.
+pub(super) fn is_within(order: f64, travel: f64) -> bool {
+    order * travel > PHASE
 }
 
 /// The orders up to `most` of which the joint travels more than a line's worth.
@@ -44,7 +69,12 @@ pub(super) fn numbers(unit: Unit, scale: f64) -> Vec<NumberSpec> {
 
 /// `order` and its number.
 pub(super) fn variant(term: &Term) -> String {
-    if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+    order(term.basis()).map_or_else(String::new, |order| format!("order{}", in_name(order)))
+}
+
+/// An order in the name of a parameter, which has no points.
+fn in_name(order: f64) -> String {
+    format!("{:.3}", order).trim_end_matches('0').trim_end_matches('.').replace('.', "_")
 }
 
 /// Every order of a cause with its amplitude, e.g. "2 times a turn by 11 arcsec".

@@ -133,6 +133,11 @@ impl Variable {
         if self == (Self::Gravity { axis: None }) { 3 } else { 1 }
     }
 
+    /// Whether it is one number of a row.
+    pub(crate) fn is_single(self) -> bool {
+        self.components() == 1 && !matches!(self, Self::ArmLoad | Self::LastMove | Self::Speed)
+    }
+
     /// One of its numbers in a row; `None` where the row does not tell.
     pub(super) fn value(self, component: usize, robot: &RobotModel, state: &ArmState) -> Option<f64> {
         match self {

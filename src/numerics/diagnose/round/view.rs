@@ -1,10 +1,10 @@
 //! The recording around the present model, as a round looks at it.
 
-use super::fit_state::{EstimatedCause, FitState, Fitter};
+use super::fit_state::{FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, poses, thinned};
-use crate::diagnose::pool::{CachedHypotheses, EarlierPool, HypothesisSet};
+use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::effect::{DeclaredForm, Hypothesis, Survey, Variable, hypotheses};
+use crate::effect::{Hypothesis, Survey};
 use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
@@ -44,27 +44,18 @@ impl<'a> RoundView<'a> {
         Survey::new(robot, data, rows, &self.torque, &self.compliance)
     }
 
-    /// The pool of all causes around the present model, or around that of an `earlier` round: the residual is that without them.
-    pub fn pool(&self, now: &FitState, fitter: &Fitter, survey: &Survey, earlier: Option<EarlierPool>) -> CachedHypotheses<'_> {
+    /// The causes of a model over what is left without them.
+    pub fn causes(&self, now: &FitState, fitter: &Fitter) -> CachedHypotheses<'_> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();
-        for EstimatedCause { form, coefficients, .. } in &now.causes {
-            let columns = problem.columns(form);
-            for (column, coefficient) in columns.chunks(problem.residual_rows()).zip(coefficients) {
+        for cause in &now.causes {
+            let columns = problem.columns(&cause.form);
+            for (column, coefficient) in columns.chunks(problem.residual_rows()).zip(&cause.coefficients) {
                 residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        if let Some(earlier) = earlier.filter(|earlier| earlier.serves(&self.problem, &self.compliance)) {
-            return CachedHypotheses::again(earlier, problem, &residual, self.autocorrelation_time);
-        }
         let jacobian = problem.jacobian(fitter.free());
-        let tried = |hypothesis: &Hypothesis| !fitter.question.without.iter().any(|name| name == hypothesis.form.cause().name());
-        let mut hypotheses: Vec<Hypothesis> = hypotheses(survey).into_iter().filter(tried).collect();
-        hypotheses.extend(fitter.question.own.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));
-        if fitter.causes_of_the_arm_first() {
-            hypotheses.retain(|hypothesis| !hypothesis.form.variables().contains(&Variable::Time));
-        }
-        hypotheses.iter_mut().for_each(|hypothesis| hypothesis.prior_penalty *= fitter.question.prior_weight);
+        let hypotheses = now.causes.iter().map(|cause| Hypothesis::new(cause.form.clone(), 1)).collect();
         HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses).into()
     }
 }

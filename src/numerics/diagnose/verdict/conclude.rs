@@ -4,17 +4,15 @@ use super::faults::stand_out_in_number;
 use super::findings::findings;
 use super::last_round::LastRound;
 use super::not_observable::{next, not_observable, not_tried};
-use super::probability::weigh_places;
 use super::unseen::unseen;
 use crate::criteria::judge::FOLDS;
 use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE, REPEATS};
 use crate::criteria::search::SIGNIFICANT;
-use crate::criteria::words::{NAMELESS, NOT_NOISE, REST, WEAK};
+use crate::criteria::words::{NAMELESS, NOT_NOISE};
 use crate::diagnose::closed_form::FormulaSearch;
-use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::Misfit;
 use crate::diagnose::round::{FitState, Fitter};
-use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
+use crate::diagnose::types::{ClosedForm, Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::diagnose::words::{Ground, slower_than_noise, statement};
 use crate::effect::names;
 use crate::estimate::{Model, cross_validate};
@@ -23,7 +21,7 @@ use crate::robot::NoiseBasis;
 
 /// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
 pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
-    let (data, state) = (&fitter.data, &last.judged.state);
+    let (data, state) = (&fitter.data, &last.state);
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &model, state.fitted.singular.len());
@@ -31,13 +29,12 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
-    let structured = last.last <= *SIGNIFICANT || lacking;
+    let structured = last.answer.nothing_last <= *SIGNIFICANT || lacking;
     let many_aside = stand_out_in_number(&state.screening, data.rows());
     let left_at_fitted_rows =
         structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE || many_aside;
     let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
-    let (rest, mut findings) = without_small_rests(findings(&last, left_at_fitted_rows));
-    weigh_places(&mut findings);
+    let findings = findings(&last, left_at_fitted_rows);
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
@@ -59,15 +56,13 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
              (another time, another region) that the fitted points do not show"
         }),
     ];
-    let signature = signature(&rest, &last, something_left, remarks);
-    let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
+    let signature = signature(&last, something_left, remarks);
+    let mut not_observable = not_observable(last.survey, &last.view.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
-    let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
-    let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
-    let formulas = search.of_all(&findings);
-    let state = last.judged.state;
+    let formulas = formulas(&last, fitter, &findings);
+    let LastRound { state, answer, .. } = last;
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
     let folds = if lengths { cross_validate(&state.session(fitter), *FOLDS, fitter.question.seed) } else { None };
@@ -85,17 +80,17 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         next_measurements: next(&findings, fitter.question.own),
         findings: within(findings, &model),
         formulas,
-        withdrawn: last.judged.withdrawn,
+        withdrawn: Vec::new(),
         clock: data.has_clock(),
         not_observable,
         signature,
         leftover_rms: misfit.leftover_rms,
         chi_square: misfit.chi_square,
-        gate_first: Some(last.first),
-        gate_last: Some(last.last),
+        gate_first: Some(answer.nothing_first),
+        gate_last: Some(answer.nothing_last),
         repeatability: fitter.repeatability,
-        located_before: last.located,
-        located_after,
+        located_before: answer.located_first,
+        located_after: answer.located_last,
         kept: state.screening.kept.clone(),
         screening: state.screening,
         model,
@@ -129,13 +124,11 @@ fn basis(fitter: &Fitter) -> NoiseBasis {
     }
 }
 
-/// Small rests apart, then the others: what has no name beside strong findings is what their shapes leave, no cause of its own.
-fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
-    let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
-    let small = |finding: &Finding| {
-        finding.has_no_law() && finding.evidence.is_some_and(|e| e.gain < *REST * strongest && e.delta_bic < *WEAK)
-    };
-    findings.into_iter().partition(small)
+/// Formulas for findings without a name.
+fn formulas(last: &LastRound, fitter: &Fitter, findings: &[Finding]) -> Vec<ClosedForm> {
+    let pool = last.view.causes(&last.state, fitter);
+    let set: Vec<usize> = (0..last.state.causes.len()).collect();
+    FormulaSearch { state: &last.state, set: &set, pool: &pool, survey: last.survey, fitter }.of_all(findings)
 }
 
 /// The share, in what all findings gain, of those without a name or with one that is more probably wrong.
@@ -170,12 +163,8 @@ fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatab
 }
 
 /// What is left looks like, where it is not noise, and what else speaks for it.
-fn signature(rest: &[Finding], last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
-    let statements: Vec<&str> = rest.iter().map(|finding| finding.statement.as_str()).collect();
-    let mut signature = (!rest.is_empty()).then(|| statements.join(" "));
-    if something_left && signature.is_none() {
-        signature = last.best();
-    }
+fn signature(last: &LastRound, something_left: bool, remarks: [Option<&str>; 2]) -> Option<String> {
+    let signature = if something_left { last.answer.next.clone() } else { None };
     let parts: Vec<&str> = signature.as_deref().into_iter().chain(remarks.into_iter().flatten()).collect();
     (!parts.is_empty()).then(|| parts.join("; "))
 }

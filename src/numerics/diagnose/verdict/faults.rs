@@ -1,6 +1,7 @@
 //! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
 use super::last_round::LastRound;
+use crate::criteria::words::FAULT;
 use crate::criteria::screen::{BULK, MISTAKES};
 use crate::diagnose::types::{Finding, Probabilities};
 use crate::effect::{Place, names};
@@ -31,7 +32,7 @@ fn is_by_the_model_alone(suspect: &Suspect) -> bool {
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell. Where physics is
 /// left, a row that only the model speaks against may be where that shows most.
 pub(super) fn faults(last: &LastRound, unknown: Option<usize>, something_left: bool) -> Vec<Finding> {
-    let screening = &last.judged.state.screening;
+    let screening = &last.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
     let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
     let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
@@ -75,7 +76,7 @@ fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -
         parameters: Vec::new(),
         evidence: None,
         rivals: Vec::new(),
-        probabilities: Probabilities::default(),
+        probabilities: Probabilities { name: *FAULT, place: *FAULT, none: 1.0 - *FAULT },
         valid: None,
         forms: Vec::new(),
     }

@@ -5,7 +5,6 @@ mod faults;
 mod findings;
 mod last_round;
 mod not_observable;
-mod probability;
 mod rivals;
 mod unseen;
 

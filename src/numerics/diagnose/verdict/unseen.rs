@@ -8,18 +8,11 @@ use std::collections::BTreeMap;
 
 /// Sentences for causes that could be as large as usual and would not be found, one a cause.
 pub(super) fn unseen(last: &LastRound) -> Vec<String> {
-    let pool = last.pool;
     let mut causes: BTreeMap<&str, (HiddenSize, Vec<String>, f64)> = BTreeMap::new();
-    for (h, hypothesis) in pool.hypotheses.iter().enumerate().filter(|(h, _)| !last.judged.set.contains(h)) {
-        let form = &hypothesis.form;
+    for (form, error) in &last.answer.hidden {
         let Some(hidden) = form.cause().hidden(form, last.survey.robot) else { continue };
-        let mut set = last.judged.set.clone();
-        set.push(h);
-        set.sort_unstable();
-        let before: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
         // What cannot be seen at all has no standard error.
-        let error = Some(pool.solve(&set).error(before)).filter(|error| *error > 0.0);
-        let limit = error.map_or(f64::INFINITY, |error| *FOUND * error);
+        let limit = *FOUND * error;
         if limit > hidden.least {
             let (_, subjects, largest) = causes.entry(form.name()).or_insert((hidden, Vec::new(), 0.0));
             subjects.push(hidden.subject.map_or_else(|| form.place().to_string(), String::from));

@@ -1,7 +1,7 @@
 //! Findings in a sentence that a mechanic understands.
 
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{HiddenSize, Place, Summary, figure};
+use crate::effect::{HiddenSize, Summary, figure};
 use crate::observation::Dimension;
 
 /// A size in the small unit of its dimension, e.g. `31 um`.
@@ -24,12 +24,6 @@ pub(crate) fn told(text: &str, rms: &str) -> String {
 pub(crate) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> String {
     let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!("something unknown acts at {}: {effect} fits best ({text}), but {why} ({rms} rms at the tool).", summary.place)
-}
-
-/// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
-pub(crate) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
-    let holds = if share < 0.995 { format!(" explains {:.0} % of it", 100.0 * share) } else { " comes close".into() };
-    format!("what acts at {place} is in no list (probability {none:.2}); the nearest of the list{holds}: {nearest}")
 }
 
 /// The sentence of a finding whose name the user has excluded.

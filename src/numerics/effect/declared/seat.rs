@@ -1,6 +1,6 @@
 //! Where a declared effect acts and what moves there, in the words of a declaration.
 
-use crate::effect::{Axes, Motion, Place, Polar};
+use crate::effect::{Axes, AxisPoint, Motion, Place, Polar};
 use crate::units::{Quantity, Unit};
 
 /// Where it may act.
@@ -75,7 +75,7 @@ impl Moves {
     pub fn at(self, place: Place) -> Option<Motion> {
         Some(match (self, place) {
             (Self::Angle, Place::Joint(joint)) => Motion::Joint { joint },
-            (Self::Axis { turning }, Place::Joint(joint)) => Motion::Axis { joint, about: None, turning },
+            (Self::Axis { turning }, Place::Joint(joint)) => Motion::Axis { joint, about: None, turning, at: AxisPoint::Own },
             (Self::Growth, Place::Links(first, last)) => Motion::Links { first, last },
             (Self::Frame(axes), Place::Base) => Motion::Base { axes },
             (Self::Frame(axes), Place::Tool) => Motion::Tool { axes },

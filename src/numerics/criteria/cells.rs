@@ -1,0 +1,60 @@
+//! The table of causes: prior odds of its cells, shapes of their curves, when a search ends.
+
+use super::CriterionValue;
+use super::table::criteria;
+
+criteria! {
+    "cells";
+    /// Prior odds of a cell of causes that most arms have.
+    COMMON: f64 = 0.02, "odds", "judgement: some of ten common kinds in each arm", "";
+    /// The same of causes that few arms have.
+    RARE: f64 = 0.005, "odds", "judgement: a quarter of the common ones", "";
+    /// The same of causes that hardly any arm has.
+    RARER: f64 = 0.002, "odds", "judgement: a tenth of the common ones", "";
+    /// Prior odds of all cells without a name at a place together.
+    UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
+    /// Prior odds of a product without a name, where one of its variables already shows there.
+    PRODUCT: f64 = 0.0007, "odds", "judgement: less than a rare cause", "";
+    /// Degrees of freedom that the stated noise is worth.
+    NU: f64 = 20.0, "rows", "judgement: a statement is as good as twenty rows", "";
+    /// Smallest amplitude, rms motion of the tool: below it no instrument sees anything.
+    SMALLEST: f64 = 1e-6, "m", "physics: a tenth of a tracker's noise", "";
+    /// Largest amplitude: above it is a wrong set-up.
+    LARGEST: f64 = 3e-2, "m", "physics: a soft arm under its payload yields by millimetres", "";
+    /// ln of the posterior odds above which a cell joins the model.
+    JOINS: f64 = 3.0, "ln of odds", "literature: strong, Jeffreys (1961)", "";
+    /// ln of the posterior odds below which a cell of the model leaves it.
+    LEAVES: f64 = 2.0, "ln of odds", "judgement: a little below the odds by which it joined", "";
+    /// By how much ln of the posterior odds has to be larger for another cell to take the place of one.
+    SWAPS: f64 = 0.5, "ln of odds", "judgement: no exchange to and fro", "";
+    /// ln of the evidence by which a shape with further numbers must be better than a plain one.
+    BENDS: f64 = 4.0, "ln of evidence", "literature: strong, Kass and Raftery (1995), for one number", "";
+    /// That the evidence misleads: true shapes, places and noise differ a little from every cell's.
+    MISLED: f64 = 0.03, "probability", "judgement: until it is measured on concealed recordings", "";
+    /// Probability from which another name is told as a rival.
+    RIVAL: f64 = 0.02, "probability", "judgement: less would not change what one does", "";
+    /// Share of the strongest finding at its place below which what has no name is a detail of it.
+    DETAIL: f64 = 0.05, "share", "physics: no law is met to a twentieth", "";
+    /// Probability that nothing more is there from which what is left is taken for noise.
+    SETTLED: f64 = 0.3, "probability", "judgement: no cell that would have joined", "";
+    /// The same of the strongest finding anywhere.
+    TRACE: f64 = 0.015, "share", "physics: no law is met to a hundredth", "";
+    /// Components of a model at most.
+    COMPONENTS: usize = 14, "components", "judgement: bounds time", "";
+    /// Cells of which every shape is asked, after all were asked coarsely.
+    CLOSELY: usize = 12, "cells", "judgement: bounds time", "";
+    /// Rounds of fitting the whole model and searching around it.
+    ROUNDS: usize = 4, "rounds", "count: two suffice as a rule", "";
+    /// Correlation lengths of curves, shares of the range of their variable.
+    LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.015], "share of the range", "count: threefold, from the whole range to what forty cosines resolve", "";
+    /// Share of a curve in a line that is not quite straight, rms over rms.
+    BENT: [f64; 2] = [0.05, 0.3], "ratio", "physics: stiffnesses change by 5 to 50 % over a load", "";
+    /// Cosines have no slope at the ends of their range: it is wider than that of the rows by this share at either end.
+    MARGIN: f64 = 0.1, "share of the range", "judgement: a slope at the end of the rows stays possible", "";
+    /// A coefficient whose motion, at its prior standard deviation, is below this share of the noise over all rows is left out.
+    IDLE: f64 = 0.2, "standard deviations", "judgement: nothing that the rows could show", "";
+    /// Residuals beyond this many standard deviations count for less.
+    FAR: f64 = 4.0, "standard deviations", "count: one in a thousand rows of normal noise", "";
+    /// Ratio of the largest to the smallest variance of the noise by direction above which its shape is estimated.
+    UNEVEN: f64 = 1.8, "ratio of variances", "count: the scatter of variances of a hundred rows", "";
+}

@@ -1,0 +1,261 @@
+//! What a search has found, as findings: which components make one up, how probable its name and its place are, what else it may be; and where
+//! the residual sits before and after.
+
+use super::cell::Cell;
+use super::evidence::log_sum;
+use super::listed::cell_of;
+use super::search::{Scan, Table, without};
+use super::state::{Block, Component, State};
+use crate::criteria::cells::{MISLED, RIVAL};
+use crate::diagnose::pool::dot;
+use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
+use crate::effect::{Basis, Clock, Form, Place, Variable, names};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// One finding of a search.
+#[derive(Clone)]
+pub(crate) struct FoundCause {
+    pub effect: &'static str,
+    pub place: Place,
+    /// Positions of its forms among the causes of the model.
+    pub members: Vec<usize>,
+    /// ln of the evidence for it beside all others.
+    pub log: f64,
+    /// Fall of the squared residual in standard deviations, and by how many numbers.
+    pub gain: f64,
+    pub numbers: usize,
+    pub probabilities: Probabilities,
+    pub rivals: Vec<RivalCause>,
+    /// Of each member: whether its coefficients are positive, and the largest of them (SI).
+    pub bounds: Vec<(bool, f64)>,
+}
+
+/// What the table says of the last model.
+pub(crate) struct Answer {
+    pub found: Vec<FoundCause>,
+    /// Probability that no further cell is there, at the start and at the end.
+    pub nothing_first: f64,
+    pub nothing_last: f64,
+    /// Standard deviation of the noise over what is stated.
+    pub kappa: f64,
+    /// What the best further cell would be.
+    pub next: Option<String>,
+    pub located_first: Located,
+    pub located_last: Located,
+    /// Standard errors of forms that geometry may hide: cause and place with the form and its error, SI.
+    pub hidden: Vec<(Form, f64)>,
+}
+
+/// The name of a component.
+fn told(own: &Component, cell: &Cell) -> &'static str {
+    let bends = cell.name == names::JOINT_COMPLIANCE && own.shape.is_bent;
+    if bends { names::JOINT_HARDENING } else { cell.name }
+}
+
+impl Table<'_, '_> {
+    /// The findings that components are; `first` is where the residual sat before any of them.
+    pub(super) fn answer(&mut self, components: &[Component], first: (Located, f64)) -> Answer {
+        self.know(components);
+        let all: Vec<&Component> = components.iter().collect();
+        let state = self.state(&all, None);
+        let scan = self.scan(&state, &all, 4, &[]);
+        let mut ranges = Vec::new();
+        let mut at = 0;
+        for own in components {
+            ranges.push(at..at + own.forms.len());
+            at += own.forms.len();
+        }
+        let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
+        for (i, own) in components.iter().enumerate() {
+            let cell = &self.cells[own.cell];
+            groups.entry((cell_of(cell.name), cell.place)).or_default().push(i);
+        }
+        let found = groups.into_values().map(|members| {
+            let mut found = self.found(components, &members, state.kappa);
+            found.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
+            found
+        });
+        let found = found.collect();
+        let next = scan.best().filter(|best| scan.log_odds[*best] > 0.0).map(|best| {
+            let cell = &self.cells[best];
+            format!("most like {} at {}", cell.name, cell.place)
+        });
+        let hidden = self.hidden(&state, &all);
+        Answer {
+            found,
+            nothing_first: first.1,
+            nothing_last: nothing(&scan),
+            kappa: state.kappa,
+            next,
+            located_first: first.0,
+            located_last: self.locate(&state),
+            hidden,
+        }
+    }
+
+    /// The finding of some components: names and places beside all others, at a noise.
+    fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCause {
+        let others = without(components, members);
+        let rest: Vec<&Component> = others.iter().collect();
+        let state = self.state(&rest, Some(kappa));
+        let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
+        // The strongest of several stands for its finding; further ones of its cell add to it.
+        let log_of = |i: usize, state: &State, rest: &[&Component]| self.log_evidence(&components[i], state, rest);
+        let strongest = members.iter().copied().max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
+        let main = strongest.unwrap_or(members[0]);
+        let cell = components[main].cell;
+        let mut log = log_of(main, &state, &rest);
+        let mut known = rest.clone();
+        known.push(&components[main]);
+        for i in members.iter().copied().filter(|i| *i != main) {
+            let beside = self.state(&known, Some(kappa));
+            log += log_of(i, &beside, &known).max(0.0);
+            known.push(&components[i]);
+        }
+        let mut scan = self.scan(&state, &rest, 8, &[cell]);
+        scan.log_odds[cell] = self.cells[cell].log_prior + log;
+        let (effect, place) = (told(&components[main], &self.cells[cell]), self.cells[cell].place);
+        let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
+        let mut bounds = Vec::new();
+        for i in members {
+            bounds.extend(components[*i].forms.iter().map(|_| (components[*i].group.positive, components[*i].group.largest)));
+        }
+        FoundCause {
+            effect,
+            place,
+            members: Vec::new(),
+            log,
+            gain: (state.rows.square - with.rows.square).max(0.0),
+            numbers: members.iter().map(|i| components[*i].shape.shares.len()).sum(),
+            probabilities,
+            rivals,
+            bounds,
+        }
+    }
+
+    /// Probabilities of a name and a place, and the rivals, by the odds of every cell and of nothing.
+    fn weigh(
+        &self,
+        (effect, place): (&'static str, Place),
+        own: usize,
+        component: &Component,
+        scan: &Scan,
+    ) -> (Probabilities, Vec<RivalCause>) {
+        let whole = log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>());
+        let mut shares: BTreeMap<(&'static str, Place), f64> = BTreeMap::new();
+        for (k, cell) in self.cells.iter().enumerate() {
+            let probability = (scan.log_odds[k] - whole).exp();
+            if probability < 1e-6 {
+                continue;
+            }
+            let bends = |found: &super::search::CellEvidence| (found.bent - found.log).exp().clamp(0.0, 1.0);
+            let bent = scan.closely.get(&k).map_or(0.0, bends);
+            // What was refined stands for its cell.
+            let bent = if k == own && component.shape.is_bent { bent.max(0.9) } else { bent };
+            if cell.name == names::JOINT_COMPLIANCE {
+                *shares.entry((names::JOINT_HARDENING, cell.place)).or_default() += bent * probability;
+                *shares.entry((cell.name, cell.place)).or_default() += (1.0 - bent) * probability;
+            } else {
+                *shares.entry((cell.name, cell.place)).or_default() += probability;
+            }
+        }
+        let sound = 1.0 - *MISLED;
+        let name = sound * shares.get(&(effect, place)).copied().unwrap_or(0.0);
+        let at_place = sound * shares.iter().filter(|(key, _)| key.1 == place).map(|(_, share)| share).sum::<f64>();
+        let rivals = shares.iter().filter(|(key, share)| **key != (effect, place) && **share > *RIVAL);
+        let rival = |((other, at), share): (&(&'static str, Place), &f64)| RivalCause {
+            effect: other,
+            place: *at,
+            delta_bic: 2.0 * (name.max(1e-12) / (sound * share)).ln(),
+            probability: sound * share,
+        };
+        let mut rivals: Vec<RivalCause> = rivals.map(rival).collect();
+        rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let of_rivals: f64 = rivals.iter().map(|rival| rival.probability).sum();
+        (Probabilities { name, place: at_place, none: (1.0 - name - of_rivals).max(0.0) }, rivals)
+    }
+
+    /// What each place, variable and order could explain of what a state leaves.
+    pub(super) fn locate(&self, state: &State) -> Located {
+        let mut best: BTreeMap<(&'static str, String), ExplainedShare> = BTreeMap::new();
+        let mut lines: BTreeMap<(usize, bool, u32), f64> = BTreeMap::new();
+        let clock = Clock::of(self.survey.data);
+        for (k, cell) in self.cells.iter().enumerate() {
+            let block = &self.coarse[k];
+            let across = state.across(|id| self.products[&id][k].clone(), block.columns.values.ncols());
+            state.shapes(block, &across, |group, shape, found| {
+                let seen = &block.groups[group];
+                let share = found.fit / state.rows.square.max(f64::MIN_POSITIVE);
+                let parameters = seen.group.shapes[shape].shares.iter().filter(|share| **share > 0.0).count();
+                let entry = |by, name: String| ExplainedShare {
+                    by,
+                    name,
+                    share,
+                    parameters,
+                    delta_bic: 2.0 * (found.log + cell.log_prior),
+                    effect: cell.name,
+                };
+                let form = &seen.group.forms[0];
+                let variables: Vec<String> = form.variables().into_iter().map(|of| clock.named(of)).collect();
+                let variable = (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
+                for (by, name) in [("place", cell.place.to_string())].into_iter().chain(variable) {
+                    let new = entry(by, name.clone());
+                    let at = best.entry((by, name)).or_insert_with(|| new.clone());
+                    if new.delta_bic > at.delta_bic {
+                        *at = new;
+                    }
+                }
+                if let Some(line) = wave(form) {
+                    let at = lines.entry(line).or_insert(0.0);
+                    *at = at.max(share);
+                }
+            });
+        }
+        let mut shares: Vec<ExplainedShare> = best.into_values().collect();
+        shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
+        let spectrum = lines.into_iter().map(|((joint, motor, order), share)| SpectrumLine { joint, motor, order, share });
+        Located { shares, spectrum: spectrum.collect() }
+    }
+
+    /// Standard errors of forms that geometry may hide.
+    fn hidden(&self, state: &State, components: &[&Component]) -> Vec<(Form, f64)> {
+        let mut out = Vec::new();
+        for cell in self.cells.iter().filter(|cell| cell.is_named()) {
+            let super::cell::Shapes::Listed(groups) = &cell.shapes else { continue };
+            for group in groups {
+                let [form] = &group.forms[..] else { continue };
+                if form.cause().hidden(form, self.survey.robot).is_none() || components.iter().any(|own| own.forms.contains(form)) {
+                    continue;
+                }
+                let block = Block::of(vec![group.clone()], self.frame);
+                let columns = block.columns.values.ncols();
+                let with = |own: &Component| {
+                    let dots = |(i, j): (usize, usize)| {
+                        dot(own.values.column(i).as_slice(), block.columns.values.column(j).as_slice())
+                    };
+                    Arc::new(nalgebra::DMatrix::from_fn(own.values.ncols(), columns, |i, j| dots((i, j))))
+                };
+                let products: BTreeMap<u64, Arc<nalgebra::DMatrix<f64>>> =
+                    components.iter().map(|own| (own.id, with(own))).collect();
+                let across = state.across(|id| products[&id].clone(), columns);
+                out.extend(state.errors(&block, &across).first().map(|error| (form.clone(), *error)));
+            }
+        }
+        out
+    }
+}
+
+/// Probability that nothing more is there.
+pub(super) fn nothing(scan: &Scan) -> f64 {
+    (-log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>())).exp()
+}
+
+/// The joint, side of the gear and order of a pure sine and cosine of a joint's or its motor's angle at that joint.
+fn wave(form: &Form) -> Option<(usize, bool, u32)> {
+    let term = form.term()?;
+    let (joint, of) = term.of_one()?;
+    let Basis::Wave { order, overtone: false } = term.basis() else { return None };
+    let motor = of == Variable::Motor { joint };
+    (motor || of == Variable::Angle { joint }).then_some((joint, motor, order))
+}

@@ -1,0 +1,338 @@
+//! Cells: a cause at a place in every shape that it may have, or a motion of a place over a variable that no cause of the list has.
+
+use crate::criteria::cells::{BENT, LENGTHS, MARGIN};
+use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Term, Unknown, Variable, names};
+use std::f64::consts::PI;
+
+/// A cause at a place, whatever its shape.
+pub(super) struct Cell {
+    /// Canonical name of the cause, `unknown` of a cell without a name.
+    pub name: &'static str,
+    pub place: Place,
+    /// What tells it from other cells of the recording.
+    pub key: String,
+    /// ln of its prior odds.
+    pub log_prior: f64,
+    pub shapes: Shapes,
+}
+
+/// The shapes of a cell.
+pub(super) enum Shapes {
+    /// As they are listed.
+    Listed(Vec<ShapeGroup>),
+    /// A motion over a variable: any curve, a line, or a step.
+    Free(FreeShape),
+}
+
+/// Forms whose columns are looked at together, in one or several shapes.
+#[derive(Clone)]
+pub(super) struct ShapeGroup {
+    pub forms: Vec<Form>,
+    pub shapes: Vec<Shape>,
+    /// Whether coefficients are positive.
+    pub positive: bool,
+    /// The largest coefficient that makes sense, SI.
+    pub largest: f64,
+}
+
+/// A shape: how the prior variance is shared among the columns of a group.
+#[derive(Clone)]
+pub(super) struct Shape {
+    /// One for each column; their sum is 1. Empty: alike.
+    pub shares: Vec<f64>,
+    /// ln of the weight of the shape within its cell.
+    pub log_weight: f64,
+    /// Whether it has further numbers beside the plain shapes of its cell.
+    pub is_bent: bool,
+}
+
+/// A motion over a variable, or over two.
+#[derive(Clone, Copy)]
+pub(super) struct FreeShape {
+    pub motion: Motion,
+    pub of: Variable,
+    pub over: Over,
+}
+
+/// In which shapes a motion follows its variable.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Over {
+    /// A line or a curve of so many cosines, fewer at first; down to this many of the correlation lengths.
+    Curve { count: usize, first: usize, lengths: usize },
+    /// A line alone.
+    Line,
+    /// A step at any time between rows.
+    Step,
+    /// Any function of both variables.
+    Product(Variable),
+}
+
+/// Functions of each of two variables.
+const EACH: usize = 6;
+/// Steps that are asked at first.
+const STEPS: usize = 24;
+/// A variable of no more values than this bears no curve.
+const FEW: usize = 3;
+
+impl Cell {
+    /// Its groups of shapes; all of them if `closely`.
+    pub fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
+        match &self.shapes {
+            Shapes::Listed(groups) if closely => with_all_steps(groups, survey),
+            Shapes::Listed(groups) => groups.clone(),
+            Shapes::Free(free) => free.groups(survey, values, closely),
+        }
+    }
+
+    /// Whether it has more shapes than are asked at first.
+    pub fn is_coarse(&self) -> bool {
+        match &self.shapes {
+            Shapes::Free(_) => true,
+            Shapes::Listed(groups) => groups.iter().all(|group| group.forms.iter().all(steps)),
+        }
+    }
+
+    pub fn is_named(&self) -> bool {
+        self.name != names::UNKNOWN
+    }
+}
+
+impl ShapeGroup {
+    /// A single form, all of its columns alike.
+    pub fn of(form: Form, log_weight: f64) -> Self {
+        let shape = Shape { shares: Vec::new(), log_weight, is_bent: false };
+        Self { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }
+    }
+}
+
+impl FreeShape {
+    fn term(&self, law: Law) -> Form {
+        Term::new(&Unknown, self.motion, law).into()
+    }
+
+    /// Its curves at all correlation lengths.
+    pub fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
+        let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of)) else { return Vec::new() };
+        let [low, high] = support(&values);
+        let shape = |shares| Shape { shares, log_weight: 0.0, is_bent: false };
+        vec![ShapeGroup {
+            forms: vec![self.term(Law::new(self.of, Basis::Cosines { low, high, count }))],
+            shapes: matern(count, lengths, self.motion).into_iter().map(shape).collect(),
+            positive: false,
+            largest: f64::INFINITY,
+        }]
+    }
+
+    fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
+        let fields = fields(self.motion);
+        match self.over {
+            Over::Step => {
+                let times: Vec<f64> =
+                    if closely { survey.boundaries.clone() } else { survey.changes(STEPS).collect() };
+                let log_weight = -(times.len().max(1) as f64).ln();
+                let form = |at| self.term(Law::new(self.of, Basis::After { at }));
+                times.into_iter().map(|at| ShapeGroup::of(form(at), log_weight)).collect()
+            }
+            Over::Line => {
+                let Some(line) = values(self.of).and_then(|values| line(&values)) else { return Vec::new() };
+                vec![ShapeGroup::of(self.term(Law::new(self.of, line)), 0.0)]
+            }
+            Over::Curve { count, first, lengths } => {
+                let Some(values) = values(self.of) else { return Vec::new() };
+                let Some(line) = line(&values) else { return Vec::new() };
+                let line = self.term(Law::new(self.of, line));
+                if has_few(&values) {
+                    return vec![ShapeGroup::of(line, 0.0)];
+                }
+                let count = if closely { count } else { first };
+                let [low, high] = support(&values);
+                let curve = self.term(Law::new(self.of, Basis::Cosines { low, high, count }));
+                let lengths = if closely { lengths } else { lengths.min(2) };
+                vec![ShapeGroup {
+                    forms: vec![line, curve],
+                    shapes: line_and_curve(fields, self.motion, &matern(count, lengths, self.motion), closely && lengths > 3),
+                    positive: false,
+                    largest: f64::INFINITY,
+                }]
+            }
+            Over::Product(other) => {
+                let factors = [self.of, other].map(|of| values(of).and_then(|values| factor(&values, closely)));
+                let [Some(a), Some(b)] = factors else { return Vec::new() };
+                let form = self.term(Law::new(self.of, a).times(other, b));
+                let spectrum = |basis: Basis, length: f64| -> Vec<f64> {
+                    match basis {
+                        Basis::Straight { .. } => vec![0.5, 0.5],
+                        basis => {
+                            let curve = density(basis.count() - 1, length);
+                            std::iter::once(0.5).chain(curve.into_iter().map(|share| 0.5 * share)).collect()
+                        }
+                    }
+                };
+                let shape = |length: f64| {
+                    let [first, second] = [a, b].map(|basis| spectrum(basis, length));
+                    let mut shares: Vec<f64> = first.iter().flat_map(|x| second.iter().map(move |y| x * y)).collect();
+                    // The constant is geometry.
+                    shares[0] = 0.0;
+                    let sum: f64 = shares.iter().sum();
+                    let shares = shares.into_iter().map(|share| share / sum).collect();
+                    Shape { shares: over_fields(shares, self.motion, fields), log_weight: -2.0_f64.ln(), is_bent: false }
+                };
+                let shapes = [1.0, 0.35].map(shape).to_vec();
+                vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]
+            }
+        }
+    }
+}
+
+/// Whether a form steps at a time.
+fn steps(form: &Form) -> bool {
+    matches!(form.term().map(Term::basis), Some(Basis::After { .. })) && form.variables() == [Variable::Time]
+}
+
+/// Groups with their steps at every time between rows.
+fn with_all_steps(groups: &[ShapeGroup], survey: &Survey) -> Vec<ShapeGroup> {
+    if !groups.iter().all(|group| group.forms.iter().all(steps)) {
+        return groups.to_vec();
+    }
+    let mut out: Vec<ShapeGroup> = groups.to_vec();
+    let mut known: Vec<Form> = groups.iter().flat_map(|group| group.forms.iter().cloned()).collect();
+    for group in groups {
+        for near in group.forms[0].near(survey, 0).into_iter().filter(|near| !known.contains(near)).collect::<Vec<_>>() {
+            out.push(ShapeGroup { forms: vec![near.clone()], ..group.clone() });
+            known.push(near);
+        }
+    }
+    let more = (groups.len() as f64 / out.len() as f64).ln();
+    out.iter_mut().flat_map(|group| &mut group.shapes).for_each(|shape| shape.log_weight += more);
+    out
+}
+
+/// A cause's line and a curve over the same variable, as one physics: a line, or one that is not quite straight.
+pub(super) fn not_quite_straight(line: Form, motion: Motion, of: Variable, values: &[f64], log_weight: f64) -> Option<ShapeGroup> {
+    const COUNT: usize = 24;
+    if has_few(values) {
+        return None;
+    }
+    let [low, high] = support(values);
+    let curve = Term::new(&Unknown, motion, Law::new(of, Basis::Cosines { low, high, count: COUNT }));
+    let fields = fields(motion);
+    let mut shapes = Vec::new();
+    for curve in matern(COUNT, 4, motion) {
+        for share in *BENT {
+            let all = 1.0 + share * share;
+            let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
+            let shares = line.chain(curve.iter().map(|own| own * share * share / all)).collect();
+            shapes.push(Shape { shares, log_weight: log_weight - 8.0_f64.ln(), is_bent: true });
+        }
+    }
+    Some(ShapeGroup { forms: vec![line, curve.into()], shapes, positive: false, largest: f64::INFINITY })
+}
+
+/// A line, curves of some correlation lengths, and lines that are not quite straight.
+fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool) -> Vec<Shape> {
+    let curve = lengths[0].len();
+    let half = 0.5_f64.ln();
+    let straight = std::iter::repeat_n(1.0 / line as f64, line).chain(std::iter::repeat_n(0.0, curve)).collect();
+    let mut out = vec![Shape { shares: straight, log_weight: half, is_bent: false }];
+    let count = (lengths.len() as f64).ln();
+    for own in lengths {
+        let alone = std::iter::repeat_n(0.0, line).chain(own.iter().copied()).collect();
+        out.push(Shape { shares: alone, log_weight: half - count, is_bent: false });
+        for share in *BENT {
+            let all = 1.0 + share * share;
+            let line = std::iter::repeat_n(1.0 / (line as f64 * all), line);
+            let shares = line.chain(own.iter().map(|own| own * share * share / all)).collect();
+            out.push(Shape { shares, log_weight: half - count - 2.0_f64.ln(), is_bent: true });
+        }
+    }
+    if rough {
+        // A curve with corners: the spectral density of an exponential kernel.
+        let density = |k: usize| 1.0 / (1.0 + (PI * k as f64 * 0.3).powi(2));
+        let all: Vec<f64> = (1..=curve / line).map(density).collect();
+        let sum: f64 = all.iter().sum();
+        let all = over_fields(all.into_iter().map(|share| share / sum).collect(), motion, line);
+        let shares = std::iter::repeat_n(0.0, line).chain(all).collect();
+        out.push(Shape { shares, log_weight: half - count, is_bent: false });
+    }
+    out
+}
+
+/// The directions of a motion.
+pub(super) fn fields(motion: Motion) -> usize {
+    match motion {
+        Motion::Axis { about: None, .. } | Motion::Slide { along: false, .. } | Motion::Bend { .. } => 2,
+        Motion::Base { axes } | Motion::Tool { axes } | Motion::Tracker { axes } => axes.count(),
+        _ => 1,
+    }
+}
+
+/// Shares of functions, for every direction of a motion alike, in the order of its coefficients.
+fn over_fields(shares: Vec<f64>, motion: Motion, fields: usize) -> Vec<f64> {
+    let scaled = |share: &f64| share / fields as f64;
+    if matches!(motion, Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }) {
+        shares.iter().flat_map(|share| std::iter::repeat_n(scaled(share), fields)).collect()
+    } else {
+        (0..fields).flat_map(|_| shares.iter().map(scaled)).collect()
+    }
+}
+
+/// Shares of cosines of a smooth curve, one list a correlation length, for every direction of a motion alike.
+fn matern(count: usize, lengths: usize, motion: Motion) -> Vec<Vec<f64>> {
+    let of = |length: &f64| over_fields(density(count, *length), motion, fields(motion));
+    LENGTHS[..lengths.min(LENGTHS.len())].iter().map(of).collect()
+}
+
+/// Shares of cosines: the spectral density of a Matern kernel with smoothness 3/2 (Rasmussen and Williams, 2006, ch. 4).
+fn density(count: usize, length: f64) -> Vec<f64> {
+    let of = |k: usize| {
+        let wave = PI * k as f64 * length / (1.0 + 2.0 * *MARGIN);
+        (3.0 + wave * wave).powi(-2)
+    };
+    let all: Vec<f64> = (1..=count).map(of).collect();
+    let sum: f64 = all.iter().sum();
+    all.into_iter().map(|density| density / sum).collect()
+}
+
+/// The lowest and highest of some values.
+fn range(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(*u), high.max(*u)])
+}
+
+/// The support of cosines over some values.
+pub(super) fn support(values: &[f64]) -> [f64; 2] {
+    let [low, high] = range(values);
+    [low - *MARGIN * (high - low), high + *MARGIN * (high - low)]
+}
+
+/// From -1 to 1 over some values; none where they hardly vary.
+pub(super) fn line(values: &[f64]) -> Option<Basis> {
+    let [low, high] = range(values);
+    let span = high - low;
+    let varies = span > 1e-9 * high.abs().max(low.abs()) && span > 1e-12;
+    varies.then_some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
+}
+
+/// Functions of one of two variables, a constant among them.
+fn factor(values: &[f64], closely: bool) -> Option<Basis> {
+    let Basis::Linear { zero, per } = line(values)? else { return None };
+    if has_few(values) {
+        return Some(Basis::Straight { zero, per });
+    }
+    let [low, high] = support(values);
+    Some(Basis::Series { low, high, count: if closely { EACH } else { EACH - 2 } })
+}
+
+/// Whether values are so few that they bear no curve.
+pub(super) fn has_few(values: &[f64]) -> bool {
+    let [low, high] = range(values);
+    let mut distinct: Vec<f64> = Vec::new();
+    for value in values {
+        if !distinct.iter().any(|other| (other - value).abs() < 1e-9 * (high - low)) {
+            distinct.push(*value);
+        }
+        if distinct.len() > FEW {
+            return false;
+        }
+    }
+    true
+}

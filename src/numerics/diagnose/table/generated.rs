@@ -1,0 +1,192 @@
+//! The cells without a name: every motion of every place over every variable of the recording, less what a named cell is; and products of
+//! two variables where one of them shows. What is left out here would take the name of a neighbour.
+
+use super::cell::{Cell, FreeShape, Over, Shapes};
+use super::frame::Frame;
+use crate::criteria::cells::{PRODUCT, UNNAMED};
+use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
+use nalgebra::Vector3;
+
+/// Directions in which the position of the tool is a variable: axes, diagonals of faces and of the cube.
+const ARROWS: [[i8; 3]; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [-1, 1, 1],
+];
+/// Limits at which what sticks beside a joint slips, as shares of its travel; times (s) in which a move fades.
+const LIMITS: [f64; 3] = [0.07, 0.14, 0.28];
+const FADING: [f64; 3] = [15.0, 35.0, 80.0];
+/// Shorter links (m) are no place of their own.
+const SHORT: f64 = 1e-3;
+
+const FINE: Over = Over::Curve { count: 40, first: 8, lengths: 5 };
+const CURVE: Over = Over::Curve { count: 20, first: 5, lengths: 3 };
+const SLOW: Over = Over::Curve { count: 8, first: 4, lengths: 2 };
+
+/// Variables of one kind, which share its prior odds.
+type Kind = Vec<(Variable, Over)>;
+
+/// All cells of one variable.
+pub(super) fn cells(survey: &Survey, frame: &mut Frame) -> Vec<Cell> {
+    let mut out = Vec::new();
+    let varies = |frame: &Frame, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
+    for place in places(survey) {
+        let families = families(place, survey);
+        let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();
+        for motions in families {
+            let kinds: Vec<Kind> = kinds(place, motions[0], survey);
+            let variables: Vec<Variable> = kinds.iter().flatten().map(|(of, _)| *of).collect();
+            frame.prepare(&motions, &variables);
+            for kind in kinds {
+                let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
+                let all: Vec<_> = kind
+                    .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
+                    .filter(|(motion, of, over)| !is_listed(*motion, *of, *over))
+                    .collect();
+                if !all.is_empty() {
+                    groups.push(all);
+                }
+            }
+        }
+        let count = groups.len() as f64;
+        for group in groups {
+            let log_prior = (*UNNAMED / count / group.len() as f64).ln();
+            out.extend(group.into_iter().map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)));
+        }
+    }
+    out
+}
+
+/// Products of a motion's variable that shows with every other one that it may follow.
+pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut Frame) -> Vec<Cell> {
+    let mut out: Vec<Cell> = Vec::new();
+    for FreeShape { motion, of, .. } in shown {
+        let kinds = kinds(motion.place(), *motion, survey);
+        let single = kinds.into_iter().filter(|kind| kind.len() < survey.joints() + 2).flatten();
+        let others: Vec<Variable> = single.map(|(other, _)| other).filter(|other| other != of).collect();
+        frame.prepare(&[*motion], &others);
+        let mut seen: Vec<Variable> = Vec::new();
+        for other in others {
+            if seen.contains(&other) || is_alike(*of, other) {
+                continue;
+            }
+            seen.push(other);
+            let free = FreeShape { motion: *motion, of: *of, over: Over::Product(other) };
+            let cell = cell(free, PRODUCT.ln());
+            if !out.iter().any(|known| known.key == cell.key) {
+                out.push(cell);
+            }
+        }
+    }
+    out
+}
+
+/// Whether two variables are one with another number.
+fn is_alike(a: Variable, b: Variable) -> bool {
+    a.to_string() == b.to_string()
+}
+
+fn cell(free: FreeShape, log_prior: f64) -> Cell {
+    let times = if let Over::Product(other) = free.over { format!(" times {other:?}") } else { String::new() };
+    let step = if free.over == Over::Step { " step" } else { "" };
+    Cell {
+        name: names::UNKNOWN,
+        place: free.motion.place(),
+        key: format!("{:?} by {:?}{times}{step}", free.motion, free.of),
+        log_prior,
+        shapes: Shapes::Free(free),
+    }
+}
+
+/// Places of cells without a name.
+fn places(survey: &Survey) -> Vec<Place> {
+    let joints = 0..survey.joints();
+    let length = |link: usize| (survey.robot.point(link + 1) - survey.robot.point(link)).norm();
+    let links = joints.clone().filter(|link| link + 1 < survey.joints() && length(*link) > SHORT);
+    let all = joints.map(Place::Joint).chain(links.map(|link| Place::Links(link, link)));
+    let instrument = survey.seen_from_outside().then_some(Place::Tracker);
+    all.chain([Place::Base, Place::Tool]).chain(instrument).collect()
+}
+
+/// The motions of a place, by family.
+fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
+    match place {
+        // What carries the first joint is the base.
+        Place::Joint(joint) if joint > 0 && survey.robot.is_revolute(joint) => vec![
+            vec![Motion::Joint { joint }],
+            vec![false, true].into_iter().map(|turning| Motion::Axis { joint, about: None, turning, at: AxisPoint::Own }).collect(),
+            vec![Motion::Slide { joint, along: true }],
+            vec![Motion::Slide { joint, along: false }],
+        ],
+        Place::Joint(joint) => vec![vec![Motion::Joint { joint }]],
+        Place::Links(link, _) => vec![vec![Motion::Links { first: link, last: link }], vec![Motion::Bend { link }]],
+        Place::Tracker => [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| vec![Motion::Instrument { of }]).to_vec(),
+        Place::Tool => vec![vec![Motion::Tool { axes: Axes::Place }]],
+        _ => [Axes::Place, Axes::Rotation].map(|axes| vec![Motion::Base { axes }]).to_vec(),
+    }
+}
+
+/// What a motion of a place may follow, by kind.
+fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
+    let joints = survey.joints();
+    let own = match place {
+        Place::Joint(joint) | Place::Links(joint, _) => joint,
+        Place::Tool => joints.saturating_sub(1),
+        _ => 0,
+    };
+    let others = || (0..joints).filter(move |joint| *joint != own);
+    let turns = matches!(motion, Motion::Joint { .. });
+    let arrows = ARROWS.map(|arrow| Vector3::from(arrow).map(f64::from).normalize().into());
+    let mut out: Vec<Kind> = Vec::new();
+    if let Motion::Instrument { .. } = motion {
+        out.extend([Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| vec![(of, CURVE)]));
+        out.push((0..joints).map(|joint| (Variable::Angle { joint }, CURVE)).collect());
+        out.push((0..joints).map(|joint| (Variable::Approach { joint }, Over::Line)).collect());
+        out.push((0..joints).map(|joint| (Variable::Move { joint }, SLOW)).collect());
+        out.push(arrows.map(|along| (Variable::Sighted { along }, SLOW)).to_vec());
+    } else {
+        out.push(vec![(Variable::Angle { joint: own }, if turns { FINE } else { CURVE })]);
+        out.push(others().map(|joint| (Variable::Angle { joint }, CURVE)).collect());
+        out.push(vec![(Variable::Approach { joint: own }, Over::Line)]);
+        out.push(others().map(|joint| (Variable::Approach { joint }, Over::Line)).collect());
+        out.push(vec![(Variable::Move { joint: own }, CURVE)]);
+        out.push(others().map(|joint| (Variable::Move { joint }, SLOW)).collect());
+        let loaded = |joint: &usize| survey.is_loaded(*joint);
+        out.push([own].into_iter().filter(loaded).map(|joint| (Variable::Load { joint }, CURVE)).collect());
+        out.push(others().filter(loaded).map(|joint| (Variable::Load { joint }, SLOW)).collect());
+        out.push(arrows.map(|along| (Variable::Position { along }, SLOW)).to_vec());
+        let limits = LIMITS.map(|share| Variable::Stretch { joint: own, limit: share * survey.travel(own) });
+        out.push(limits.map(|of| (of, SLOW)).to_vec());
+        if survey.data.has_clock() {
+            out.push(FADING.map(|time| (Variable::Recent { joint: own, time }, SLOW)).to_vec());
+        }
+    }
+    if place == Place::Tool {
+        out.push((0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, SLOW)).collect());
+    }
+    out.push(vec![(Variable::Time, CURVE)]);
+    out.push(vec![(Variable::Time, Over::Step)]);
+    out.push(vec![(Variable::Temperature, CURVE)]);
+    out.push(vec![(Variable::Payload, Over::Line)]);
+    out.retain(|kind| !kind.is_empty());
+    out
+}
+
+/// Whether a named cell is this motion over this variable in all shapes.
+fn is_listed(motion: Motion, of: Variable, over: Over) -> bool {
+    match (motion, of, over) {
+        (Motion::Joint { joint }, Variable::Approach { joint: by } | Variable::Load { joint: by }, _) => joint == by,
+        (Motion::Joint { .. } | Motion::Base { .. } | Motion::Tool { .. }, Variable::Time, Over::Step) => true,
+        _ => false,
+    }
+}

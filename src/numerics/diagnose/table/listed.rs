@@ -1,0 +1,152 @@
+//! The cells that have a name: each cause of the library at each of its places, in the shapes that it proposes and as curves of the same
+//! physics.
+
+use super::cell::{Cell, FreeShape, Over, Shape, ShapeGroup, Shapes, not_quite_straight};
+use crate::criteria::cells::{COMMON, RARE, RARER};
+use crate::effect::{
+    AxisPoint, Basis, CAUSES, DeclaredCause, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, names,
+};
+use std::collections::BTreeMap;
+
+/// Causes that most arms have; all others of the list are rare.
+const OF_MOST_ARMS: [&str; 11] = [
+    names::JOINT_COMPLIANCE,
+    names::GEAR_CYCLIC,
+    names::BACKLASH,
+    names::ZERO_SHIFT,
+    names::AXIS_WOBBLE,
+    names::LINK_COMPLIANCE,
+    "base_compliance",
+    "thermal_growth",
+    "tracker_drift",
+    "tracker_circle",
+    "tracker_elevation",
+];
+
+/// Prior odds of a cell of a cause.
+fn odds(name: &str) -> f64 {
+    match name {
+        names::CABLE_DRAG => *RARER,
+        name if OF_MOST_ARMS.contains(&name) => *COMMON,
+        _ => *RARE,
+    }
+}
+
+/// The cause under whose name a form is a cell: a joint yields to its load in one way, in proportion or not.
+pub(super) fn cell_of(cause: &'static str) -> &'static str {
+    if cause == names::JOINT_HARDENING { names::JOINT_COMPLIANCE } else { cause }
+}
+
+/// All cells with a name; those of `without` keep their shapes and lose the name.
+pub(super) fn cells(
+    survey: &Survey,
+    values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+    without: &[String],
+    declared: &[&'static DeclaredCause],
+) -> Vec<Cell> {
+    let mut all: BTreeMap<(&'static str, Place), Vec<Hypothesis>> = BTreeMap::new();
+    // What is a cell of its own without a name, or no cell at all.
+    let other = [names::UNKNOWN, names::JOINT_TABLE, names::OUTLIER, names::MISLABELLED_POINT];
+    let causes = CAUSES.iter().filter(|cause| !other.contains(&cause.name()));
+    let proposed = causes.flat_map(|cause| cause.propose(survey));
+    let proposed = proposed.chain(declared.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));
+    for hypothesis in proposed {
+        let key = (cell_of(hypothesis.form.name()), hypothesis.form.place());
+        all.entry(key).or_default().push(hypothesis);
+    }
+    for joint in survey.revolute() {
+        let pulled = hoses(survey, joint);
+        if !pulled.is_empty() {
+            all.entry((names::CABLE_DRAG, Place::Joint(joint))).or_default().extend(pulled);
+        }
+    }
+    let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
+        let mut groups = weighed(hypotheses);
+        groups.extend(curves(name, place, &groups, values));
+        let told = if without.iter().any(|out| out == name) { names::UNKNOWN } else { name };
+        Cell { name: told, place, key: format!("{name}@{place}"), log_prior: odds(name).ln(), shapes: Shapes::Listed(groups) }
+    };
+    all.into_iter().map(cell).collect()
+}
+
+/// The forms of a cell, weighed by how many like them are tried and how rare they are beside each other.
+fn weighed(hypotheses: Vec<Hypothesis>) -> Vec<ShapeGroup> {
+    let weight = |hypothesis: &Hypothesis| (-0.5 * hypothesis.prior_penalty).exp() / hypothesis.tried;
+    let sum: f64 = hypotheses.iter().map(weight).sum();
+    let plain = hypotheses.iter().map(weight).fold(0.0, f64::max);
+    let one = |hypothesis: Hypothesis| {
+        let weight = weight(&hypothesis);
+        let is_bent = hypothesis.form.name() == names::JOINT_HARDENING || weight < 0.5 * plain && hypothesis.tried > 1.0;
+        let shape = Shape { shares: Vec::new(), log_weight: (weight / sum).ln(), is_bent };
+        ShapeGroup {
+            forms: vec![hypothesis.form],
+            shapes: vec![shape],
+            positive: hypothesis.positive,
+            largest: hypothesis.largest,
+        }
+    };
+    hypotheses.into_iter().map(one).collect()
+}
+
+/// Curves that are the same physics as a cause's own laws.
+fn curves(
+    name: &str,
+    place: Place,
+    groups: &[ShapeGroup],
+    values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+) -> Vec<ShapeGroup> {
+    let Place::Joint(joint) = place else { return Vec::new() };
+    let (motion, load) = (Motion::Joint { joint }, Variable::Load { joint });
+    match name {
+        names::JOINT_COMPLIANCE => {
+            let line = groups.iter().flat_map(|group| &group.forms).find(|form| form.name() == name);
+            let line = line.filter(|form| form.variables() == [load] && form.compliance(&[1.0]).is_some());
+            let curve = line.cloned().zip(values(load));
+            curve.and_then(|(line, values)| not_quite_straight(line, motion, load, &values, 0.0)).into_iter().collect()
+        }
+        names::BACKLASH => {
+            let gap = groups.iter().flat_map(|group| &group.forms).any(|form| form.variables() == [Variable::Approach { joint }]);
+            let Some(values) = values(load).filter(|_| gap) else { return Vec::new() };
+            let Some(Basis::Linear { .. }) = super::cell::line(&values) else { return Vec::new() };
+            let [low, high] = super::cell::support(&values);
+            let law = Law::of(Variable::Approach { joint }).times(load, Basis::Series { low, high, count: 8 });
+            let shares = std::iter::once(0.5).chain([0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004]).collect();
+            let shape = Shape { shares, log_weight: 0.3_f64.ln(), is_bent: true };
+            let form = Term::new(&Unknown, motion, law).into();
+            vec![ShapeGroup { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }]
+        }
+        names::AXIS_WOBBLE => {
+            let of = Variable::Angle { joint };
+            let Some(values) = values(of).filter(|values| !super::cell::has_few(values)) else { return Vec::new() };
+            let free = |turning| FreeShape {
+                motion: Motion::Axis { joint, about: None, turning, at: AxisPoint::Own },
+                of,
+                over: Over::Curve { count: 12, first: 12, lengths: 3 },
+            };
+            let known = |_: Variable| Some(values.clone());
+            let mut out: Vec<ShapeGroup> = [true, false].into_iter().flat_map(|turning| free(turning).curves(&known)).collect();
+            let count = out.iter().map(|group| group.shapes.len()).sum::<usize>().max(1) as f64;
+            let shapes = out.iter_mut().flat_map(|group| &mut group.shapes);
+            shapes.for_each(|shape| shape.log_weight = 0.3_f64.ln() - count.ln());
+            out
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Pulls on a joint by its own angle and a neighbour's.
+fn hoses(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
+    let turns = |other: &usize| *other < survey.joints() && survey.robot.is_revolute(*other) && survey.travel(*other) > 0.0;
+    let neighbours: Vec<usize> = [joint.wrapping_sub(1), joint + 1].into_iter().filter(turns).collect();
+    let wave = Basis::Wave { order: 1, overtone: false };
+    let law = |other: &usize| {
+        let cosines = |joint: usize| {
+            let [low, high] = survey.range[joint];
+            Basis::Series { low, high, count: 3 }
+        };
+        let [own, other] = [joint, *other].map(|joint| (Variable::Angle { joint }, cosines(joint)));
+        [Law::new(own.0, wave).times(other.0, wave), Law::new(own.0, own.1).times(other.0, other.1)]
+    };
+    let laws = neighbours.iter().flat_map(law);
+    laws.map(|law| Hypothesis::new(Term::new(&Unknown, Motion::Joint { joint }, law), 2 * neighbours.len())).collect()
+}

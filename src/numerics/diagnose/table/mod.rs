@@ -1,0 +1,152 @@
+//! The table of causes: every cause is a cell (a place, a motion there, what it follows), the curve inside is free, and all cells, with a name
+//! or without, compete by one evidence.
+//!
+//! A cell's shapes share one unit of prior weight, so that a cause pays for being there and not for the number of its shapes; components
+//! that were accepted sit in the covariance of the rows, and every other cell is asked beside them.
+
+mod answer;
+mod cell;
+mod evidence;
+mod frame;
+mod generated;
+mod listed;
+mod search;
+mod state;
+
+pub(crate) use answer::{Answer, FoundCause};
+
+use super::round::{EstimatedCause, FitState, Fitter, RoundView};
+use super::types::Located;
+use crate::criteria::cells::{IDLE, ROUNDS};
+use crate::effect::{Basis, Form, Law, Motion, Variable};
+use crate::estimate::Prior;
+use cell::FreeShape;
+use frame::{Frame, NoiseShape};
+use search::Table;
+use state::Component;
+
+/// What rounds of searching around better and better models keep.
+#[derive(Default)]
+pub(crate) struct Rounds {
+    /// Components with the keys of their cells.
+    components: Vec<(String, Component)>,
+    shown: Vec<FreeShape>,
+    first: Option<(Located, f64)>,
+    round: usize,
+}
+
+/// What a round found.
+pub(crate) struct Round {
+    pub causes: Vec<EstimatedCause>,
+    /// What it means, where the round is the last one.
+    pub answer: Option<Answer>,
+    /// How many cells were compared.
+    pub cells: usize,
+}
+
+impl Rounds {
+    /// The number of rounds so far.
+    pub fn count(&self) -> usize {
+        self.round
+    }
+
+    /// From the beginning, where the noise is believed to be another one; where the residual sat at first stays.
+    pub fn again(&mut self) {
+        *self = Self { first: self.first.take(), ..Self::default() };
+    }
+
+    /// Searches around a fitted model.
+    pub fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
+        self.round += 1;
+        let survey = view.survey();
+        let noise = if self.round > 1 { NoiseShape::of(view, fitter.data.rows()) } else { NoiseShape::default() };
+        let mut frame = Frame::of(view, now, fitter, noise);
+        let question = fitter.question;
+        let slow = |form: &Form| form.variables().contains(&Variable::Time);
+        let keeps = |cell: &cell::Cell| {
+            !(fitter.causes_of_the_arm_first() && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
+        };
+        let mut table = Table::new(&mut frame, &survey, question.without, question.own, &self.shown, keeps);
+        let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
+        let mut components = Vec::new();
+        for (key, own) in std::mem::take(&mut self.components) {
+            if let Some(cell) = table.cell(&key) {
+                components.push(table.component_of(&own, cell));
+            }
+        }
+        if self.first.is_none() {
+            let state = table.state(&[], None);
+            let scan = table.scan(&state, &[], 12, &[]);
+            self.first = Some((table.locate(&state), answer::nothing(&scan)));
+        }
+        if !components.is_empty() {
+            components = table.backfit(components, 1);
+        }
+        components = table.grow(components);
+        if !components.is_empty() {
+            components = table.swap(components);
+            components = table.grow(components);
+            components = table.periodic(components);
+        }
+        let keys: Vec<String> = components.iter().map(|own| table.cells[own.cell].key.clone()).collect();
+        let sorted = |keys: &[String]| {
+            let mut keys = keys.to_vec();
+            keys.sort();
+            keys
+        };
+        let shown = table.shown(&components);
+        let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
+        let is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
+        let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
+        let causes = estimated(&table, &components);
+        let cells = table.cells.len();
+        self.components = keys.into_iter().zip(components).collect();
+        self.shown = shown;
+        Round { causes, answer, cells }
+    }
+}
+
+/// Components as causes of the whole model, each with what the evidence says of the size of its coefficients; waves that the rows could not
+/// show are left out.
+fn estimated(table: &Table, components: &[Component]) -> Vec<EstimatedCause> {
+    let all: Vec<&Component> = components.iter().collect();
+    let coefficients = table.state(&all, None).coefficients(&all);
+    let mut out = Vec::new();
+    for (own, coefficients) in components.iter().zip(coefficients) {
+        let sigmas = own.sigmas();
+        let seen = |k: usize| {
+            let root = own.amplitude * own.shape.shares[k].sqrt();
+            root * own.values.column(k).norm() > *IDLE
+        };
+        let mut first = 0;
+        for (form, count) in own.forms.iter().zip(&own.counts) {
+            let range = first..first + count;
+            first += count;
+            let (form, kept) = without_idle_waves(form, *count, &|k| seen(range.start + k));
+            out.push(EstimatedCause {
+                form,
+                coefficients: kept.iter().map(|k| coefficients[range.start + k]).collect(),
+                priors: kept.iter().map(|k| Prior { mean: 0.0, sigma: sigmas[range.start + k].max(f64::MIN_POSITIVE.sqrt()) }).collect(),
+            });
+        }
+    }
+    out
+}
+
+/// A form with a curve of no more waves than are `seen`, and which of its columns stay.
+fn without_idle_waves(form: &Form, count: usize, seen: &dyn Fn(usize) -> bool) -> (Form, Vec<usize>) {
+    let all: Vec<usize> = (0..count).collect();
+    let Some(term) = form.term() else { return (form.clone(), all) };
+    let (Basis::Cosines { low, high, count: waves }, None) = (term.basis(), term.law().times) else { return (form.clone(), all) };
+    let fields = count / waves.max(1);
+    let alternates = matches!(term.motion(), Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. });
+    let column = |wave: usize, field: usize| if alternates { wave * fields + field } else { field * waves + wave };
+    let last = (0..waves).rev().find(|wave| (0..fields).any(|field| seen(column(*wave, field)))).map_or(1, |last| last + 1);
+    let law = Law::new(term.law().first.of, Basis::Cosines { low, high, count: last });
+    let kept = if alternates {
+        (0..last * fields).collect()
+    } else {
+        (0..fields).flat_map(|field| (0..last).map(move |wave| field * waves + wave)).collect()
+    };
+    (Form::from(term.with(law)), kept)
+}

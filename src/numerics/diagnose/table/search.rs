@@ -1,0 +1,555 @@
+//! The search for the cells that the rows show: forward, exchange, drop, refine, each by the evidence of a cell beside all others.
+
+use super::cell::{Cell, FreeShape, Shapes};
+use super::evidence::{AMPLITUDES, log_sum};
+use super::frame::{Frame, product, view};
+use super::state::{Block, Component, State};
+use super::{generated, listed};
+use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SWAPS};
+use crate::effect::{Basis, DeclaredCause, Form, Survey, Variable};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, OnceLock};
+
+/// ln of odds, below the best ones, from which a cell is not asked; and below which none is.
+const FAR_BELOW: f64 = 12.0;
+const UNLIKELY: f64 = -8.0;
+
+/// The table of cells over the rows of a recording.
+pub(super) struct Table<'f, 'a> {
+    pub frame: &'f Frame<'a>,
+    pub survey: &'f Survey<'f>,
+    pub cells: Vec<Cell>,
+    pub coarse: Vec<Block>,
+    fine: Vec<OnceLock<Block>>,
+    /// Products of the columns of each component with those of every coarse block.
+    pub products: BTreeMap<u64, Vec<Arc<DMatrix<f64>>>>,
+    next: u64,
+    /// Motions and variables whose products with others are cells.
+    multiplied: Vec<FreeShape>,
+}
+
+/// What a cell says beside a state, with its likeliest shape.
+#[derive(Clone)]
+pub(super) struct CellEvidence {
+    /// ln of the evidence, all shapes mixed.
+    pub log: f64,
+    /// The same of its shapes with further numbers.
+    pub bent: f64,
+    /// Group and shape.
+    shape: (usize, usize),
+    amplitude: f64,
+    /// The shape with its numbers where they say most, with ln of its evidence and its amplitude.
+    refined: Option<(Form, f64, f64)>,
+}
+
+/// ln of posterior odds of every cell beside a state.
+pub(super) struct Scan {
+    /// Minus infinity of cells that are not asked.
+    pub log_odds: Vec<f64>,
+    /// Of those that were asked closely.
+    pub closely: BTreeMap<usize, CellEvidence>,
+}
+
+impl Scan {
+    /// The cell of the largest odds among those asked closely.
+    pub fn best(&self) -> Option<usize> {
+        self.closely.keys().copied().max_by(|a, b| self.log_odds[*a].total_cmp(&self.log_odds[*b]))
+    }
+}
+
+impl<'f, 'a> Table<'f, 'a> {
+    /// All cells of a recording.
+    pub fn new(
+        frame: &'f mut Frame<'a>,
+        survey: &'f Survey<'f>,
+        without: &[String],
+        declared: &[&'static DeclaredCause],
+        shown: &[FreeShape],
+        keeps: impl Fn(&Cell) -> bool,
+    ) -> Self {
+        let mut cells = generated::cells(survey, frame);
+        cells.extend(generated::products(shown, survey, frame));
+        let values = |of: Variable| frame.values(of);
+        let mut named = listed::cells(survey, &values, without, declared);
+        named.append(&mut cells);
+        named.retain(keeps);
+        let mut motions = Vec::new();
+        let mut variables = Vec::new();
+        for form in named.iter().flat_map(|cell| cell.groups(survey, &values, false)).flat_map(|group| group.forms) {
+            let Some(term) = form.term() else { continue };
+            if !motions.contains(&term.motion()) {
+                motions.push(term.motion());
+            }
+            variables.extend(term.law().variables().into_iter().filter(|of| of.is_single() && !variables.contains(of)).collect::<Vec<_>>());
+        }
+        frame.prepare(&motions, &variables);
+        let frame = &*frame;
+        let values = |of: Variable| frame.values(of);
+        let coarse: Vec<Block> =
+            named.par_iter().map(|cell| Block::of(cell.groups(survey, &values, false), frame)).collect();
+        let fine = named.iter().map(|_| OnceLock::new()).collect();
+        Self { frame, survey, cells: named, coarse, fine, products: BTreeMap::new(), next: 0, multiplied: shown.to_vec() }
+    }
+
+    /// The cell of a key.
+    pub fn cell(&self, key: &str) -> Option<usize> {
+        self.cells.iter().position(|cell| cell.key == key)
+    }
+
+    fn fine(&self, cell: usize) -> &Block {
+        if !self.cells[cell].is_coarse() {
+            return &self.coarse[cell];
+        }
+        self.fine[cell].get_or_init(|| {
+            let values = |of: Variable| self.frame.values(of);
+            Block::of(self.cells[cell].groups(self.survey, &values, true), self.frame)
+        })
+    }
+
+    /// Computes once what scans need of some components.
+    pub fn know(&mut self, components: &[Component]) {
+        for own in components {
+            if !self.products.contains_key(&own.id) {
+                let with = |block: &Block| Arc::new(product(view(&own.values), view(&block.columns.values)));
+                self.products.insert(own.id, self.coarse.par_iter().map(with).collect());
+            }
+        }
+        let known: BTreeSet<u64> = components.iter().map(|own| own.id).collect();
+        if self.products.len() > 4 * *COMPONENTS {
+            self.products.retain(|id, _| known.contains(id));
+        }
+    }
+
+    pub fn state(&self, components: &[&Component], kappa: Option<f64>) -> State {
+        State::of(components, self.frame, kappa)
+    }
+
+    /// The evidence of a cell in all of its shapes beside a state of some components.
+    pub fn closely(&self, cell: usize, state: &State, components: &[&Component]) -> Option<CellEvidence> {
+        let block = self.fine(cell);
+        let products: BTreeMap<u64, Arc<DMatrix<f64>>> = components
+            .iter()
+            .map(|own| (own.id, Arc::new(product(view(&own.values), view(&block.columns.values)))))
+            .collect();
+        let across = state.across(|id| products[&id].clone(), block.columns.values.ncols());
+        let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
+        // A model holds every number once, by its name.
+        let keys: BTreeSet<String> = components.iter().flat_map(|own| &own.forms).map(Form::key).collect();
+        let is_there = |group: usize| block.groups[group].group.forms.iter().any(|form| keys.contains(&form.key()));
+        let there: Vec<bool> = (0..block.groups.len()).map(|group| !keys.is_empty() && is_there(group)).collect();
+        state.shapes(block, &across, |group, shape, found| {
+            if !there[group] {
+                all.push((found.log, group, shape, found.amplitude));
+            }
+        });
+        // A shape of further numbers only where it is clearly better.
+        let price = |group: usize, shape: usize| if block.groups[group].group.shapes[shape].is_bent { *BENDS } else { 0.0 };
+        let paid = |one: &&(f64, usize, usize, f64)| one.0 - price(one.1, one.2);
+        let best = all.iter().max_by(|a, b| paid(a).total_cmp(&paid(b)))?;
+        let log = log_sum(&all.iter().map(|one| one.0).collect::<Vec<_>>());
+        let bent = log_sum(&all.iter().filter(|one| price(one.1, one.2) > 0.0).map(|one| one.0).collect::<Vec<_>>());
+        Some(CellEvidence { log, bent, shape: (best.1, best.2), amplitude: best.3, refined: None })
+    }
+
+    /// The odds of every cell beside a state, closely those of the best and of some more. A cell that has a component already has no price for
+    /// another one.
+    pub fn scan(&self, state: &State, components: &[&Component], most: usize, also: &[usize]) -> Scan {
+        let prior = |cell: usize| {
+            if components.iter().any(|own| own.cell == cell) { 0.0 } else { self.cells[cell].log_prior }
+        };
+        let across = |cell: usize| state.across(|id| self.products[&id][cell].clone(), self.coarse[cell].columns.values.ncols());
+        let bound = |cell: usize| prior(cell) + state.bound(&self.coarse[cell], &across(cell));
+        let bounds: Vec<f64> = (0..self.cells.len()).into_par_iter().map(bound).collect();
+        let coarse = |cell: usize| {
+            let mut logs = Vec::new();
+            state.shapes(&self.coarse[cell], &across(cell), |_, _, found| logs.push(found.log));
+            prior(cell) + log_sum(&logs)
+        };
+        let mut promising: Vec<usize> = (0..self.cells.len()).collect();
+        promising.sort_by(|a, b| bounds[*b].total_cmp(&bounds[*a]).then(a.cmp(b)));
+        let mut log_odds = vec![f64::NEG_INFINITY; self.cells.len()];
+        // In turns, until no other cell could come near the best.
+        for some in promising.chunks(2 * most) {
+            let best = log_odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if bounds[some[0]] < (best - FAR_BELOW).max(UNLIKELY) {
+                break;
+            }
+            let found: Vec<(usize, f64)> = some.par_iter().map(|cell| (*cell, coarse(*cell))).collect();
+            found.into_iter().for_each(|(cell, log)| log_odds[cell] = log);
+        }
+        let mut order: Vec<usize> = (0..self.cells.len()).filter(|cell| log_odds[*cell].is_finite()).collect();
+        order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
+        order.truncate(most);
+        order.extend(also.iter().copied().filter(|cell| !order.contains(cell)).collect::<Vec<_>>());
+        let closely: BTreeMap<usize, CellEvidence> = order
+            .into_par_iter()
+            .filter_map(|cell| Some((cell, self.closely(cell, state, components)?)))
+            .collect();
+        for (cell, found) in &closely {
+            log_odds[*cell] = prior(*cell) + found.log;
+        }
+        let mut scan = Scan { log_odds, closely };
+        self.refine(&mut scan, state, components, &prior);
+        scan
+    }
+
+    /// Gives listed shapes that are near the best cell the numbers that say most: a free curve has no numbers to be refined.
+    fn refine(&self, scan: &mut Scan, state: &State, components: &[&Component], prior: &(dyn Fn(usize) -> f64 + Sync)) {
+        let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
+        let best = scan.best();
+        let open = best.is_some_and(|best| !self.cells[best].is_named());
+        let near = |cell: &usize| open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0) && scan.log_odds[*cell] > -5.0;
+        let named = |cell: &usize| self.cells[*cell].is_named() && (Some(*cell) == best || near(cell));
+        let listed: Vec<usize> = scan.closely.keys().copied().filter(named).collect();
+        let refined: Vec<(usize, (Form, f64, f64))> = listed
+            .into_par_iter()
+            .filter_map(|cell| Some((cell, self.refined(cell, &scan.closely[&cell], state, components)?)))
+            .collect();
+        for (cell, own) in refined {
+            let Some(found) = scan.closely.get_mut(&cell) else { continue };
+            if own.1 > found.log {
+                found.log = own.1;
+                scan.log_odds[cell] = prior(cell) + own.1;
+            }
+            found.refined = Some(own);
+        }
+    }
+
+    /// The component that a cell is in a scan.
+    fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
+        self.next += 1;
+        let own = self.as_found(cell, found);
+        let Some((form, _, amplitude)) = found.refined.clone() else { return Component { id: self.next, ..own } };
+        let own = Component { forms: vec![form], amplitude, ..own };
+        self.component_of(&own, cell)
+    }
+
+    /// The same with the numbers of its listed shape.
+    fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
+        let block = self.fine(cell);
+        let seen = &block.groups[found.shape.0];
+        let shape = seen.group.shapes[found.shape.1].clone();
+        // Forms that this shape leaves out.
+        let mut at = 0;
+        let (mut forms, mut counts, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+        for (form, count) in seen.group.forms.iter().zip(&seen.counts) {
+            let columns = at..at + count;
+            at += count;
+            if shape.shares[columns.clone()].iter().any(|share| *share > 0.0) {
+                forms.push(form.clone());
+                counts.push(*count);
+                kept.extend(columns);
+            }
+        }
+        let values = block.columns.values.select_columns(kept.iter().map(|k| seen.range.start + k).collect::<Vec<_>>().iter());
+        let square = kept.iter().map(|k| block.columns.square[seen.range.start + k]).collect();
+        let shares = kept.iter().map(|k| shape.shares[*k]).collect();
+        let shape = super::cell::Shape { shares, ..shape };
+        let group = super::cell::ShapeGroup { forms: forms.clone(), shapes: vec![shape.clone()], ..seen.group.clone() };
+        Component {
+            id: 0,
+            cell,
+            forms,
+            counts,
+            shape,
+            group: Arc::new(group),
+            values: Arc::new(values),
+            square: Arc::new(square),
+            amplitude: found.amplitude,
+        }
+    }
+
+    /// A component of given forms, e.g. of the model before.
+    pub fn component_of(&mut self, before: &Component, cell: usize) -> Component {
+        self.next += 1;
+        let (columns, counts) = self.frame.columns(&before.forms);
+        Component {
+            id: self.next,
+            cell,
+            counts,
+            values: Arc::new(columns.values),
+            square: Arc::new(columns.square),
+            ..before.clone()
+        }
+    }
+
+    /// ln of the evidence of one shape with its weight beside a state, and its amplitude.
+    fn of_component(&self, own: &Component, state: &State, others: &[&Component]) -> Option<(f64, f64)> {
+        let mut group = (*own.group).clone();
+        group.forms.clone_from(&own.forms);
+        let block = Block::of(vec![group], self.frame);
+        let products: BTreeMap<u64, Arc<DMatrix<f64>>> = others
+            .iter()
+            .map(|other| (other.id, Arc::new(product(view(&other.values), view(&block.columns.values)))))
+            .collect();
+        let across = state.across(|id| products[&id].clone(), block.columns.values.ncols());
+        let mut found = None;
+        state.shapes(&block, &across, |_, _, own| found = Some((own.log, own.amplitude)));
+        found
+    }
+
+    /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
+    fn refined(&self, cell: usize, found: &CellEvidence, state: &State, others: &[&Component]) -> Option<(Form, f64, f64)> {
+        const LEVELS: i32 = 5;
+        let mut best = self.as_found(cell, found);
+        let [form] = &best.forms[..] else { return None };
+        let mut form = form.clone();
+        if form.cause().is_nameless() {
+            return None;
+        }
+        let keys: BTreeSet<String> = others.iter().flat_map(|own| &own.forms).map(Form::key).collect();
+        let (mut log, mut amplitude) = self.of_component(&best, state, others)?;
+        let mut moved = false;
+        for level in 0..LEVELS {
+            loop {
+                let near = form.near(self.survey, level);
+                let tried = near.into_iter().filter(|near| !keys.contains(&near.key())).filter_map(|near| {
+                    let other = Component { forms: vec![near.clone()], ..best.clone() };
+                    self.of_component(&other, state, others).map(|(log, amplitude)| (log, amplitude, near))
+                });
+                let leaves_whole = |near: &Form| is_whole_order(&form) && !is_whole_order(near);
+                let paid = |(log, _, near): &(f64, f64, Form)| log - if leaves_whole(near) { *BENDS } else { 0.0 };
+                let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else { break };
+                if paid(&next) <= log + 1e-6 {
+                    break;
+                }
+                let gained = next.0 - log;
+                (log, amplitude, form) = next;
+                best.forms = vec![form.clone()];
+                moved = true;
+                if gained < 0.05 {
+                    break;
+                }
+            }
+        }
+        moved.then_some((form, log, amplitude))
+    }
+
+    /// Every component anew beside all others: shape and amplitude.
+    pub fn backfit(&mut self, mut components: Vec<Component>, rounds: usize) -> Vec<Component> {
+        for _ in 0..rounds {
+            self.know(&components);
+            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let mut changed = false;
+            for i in 0..components.len() {
+                let others: Vec<Component> = without(&components, &[i]);
+                let others: Vec<&Component> = others.iter().collect();
+                let state = self.state(&others, Some(kappa));
+                let own = self.of_component(&components[i], &state, &others);
+                let Some(own) = own else { continue };
+                (components[i].amplitude, changed) = (own.1, changed || components[i].amplitude != own.1);
+                let Some(mut grid) = self.closely(components[i].cell, &state, &others) else { continue };
+                let found = self.as_found(components[i].cell, &grid);
+                if found.forms == components[i].forms && found.shape.shares.len() == components[i].shape.shares.len() {
+                    changed |= components[i].shape.shares != found.shape.shares;
+                    components[i].shape = found.shape;
+                    components[i].group = found.group;
+                    components[i].amplitude = found.amplitude;
+                    continue;
+                }
+                let Some(other) = self.of_component(&found, &state, &others) else { continue };
+                if other.0 > own.0 + *SWAPS {
+                    grid.refined = self.refined(components[i].cell, &grid, &state, &others);
+                    components[i] = self.component(components[i].cell, &grid);
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        self.know(&components);
+        components
+    }
+
+    /// Adds cells while they pay.
+    pub fn grow(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+        self.know(&components);
+        while components.len() < *COMPONENTS {
+            let now: Vec<&Component> = components.iter().collect();
+            let state = self.state(&now, None);
+            let scan = self.scan(&state, &now, *CLOSELY, &[]);
+            let Some(best) = scan.best() else { break };
+            if std::env::var("CALIB_DEBUG").is_ok() {
+                for (k, c) in self.cells.iter().enumerate() { if c.place == crate::effect::Place::Tracker && scan.log_odds[k] > 5.0 { eprintln!("  tr {:.1} {}", scan.log_odds[k], c.key); } }
+                let mut order: Vec<usize> = (0..self.cells.len()).filter(|c| scan.log_odds[*c].is_finite()).collect();
+                order.sort_by(|a, b| scan.log_odds[*b].total_cmp(&scan.log_odds[*a]));
+                eprintln!("kappa {:.3} n {} comps {:?}", state.kappa, state.rows.freedom, components.iter().map(|c| (self.cells[c.cell].key.clone(), (c.amplitude * 1e6) as i64)).collect::<Vec<_>>());
+                for c in order.iter().take(8) { eprintln!("     {:.1} {} {}", scan.log_odds[*c], self.cells[*c].key, scan.closely.contains_key(c)); }
+            }
+            // A misjudged noise makes everything seem likely.
+            let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
+            if scan.log_odds[best] < price {
+                break;
+            }
+            let found = scan.closely[&best].clone();
+            components.push(self.component(best, &found));
+            components = self.backfit(components, 2);
+        }
+        self.prune(components)
+    }
+
+    /// Drops cells that no longer pay.
+    fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+        loop {
+            if components.is_empty() {
+                return components;
+            }
+            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let odds: Vec<f64> = (0..components.len()).map(|i| self.log_odds_of(&components, i, kappa)).collect();
+            let least = (0..odds.len()).min_by(|a, b| odds[*a].total_cmp(&odds[*b])).unwrap_or(0);
+            if odds[least] > *LEAVES {
+                return components;
+            }
+            components = self.backfit(without(&components, &[least]), 2);
+        }
+    }
+
+    /// ln of the odds of a component beside all others.
+    fn log_odds_of(&self, components: &[Component], i: usize, kappa: f64) -> f64 {
+        let others = without(components, &[i]);
+        let others: Vec<&Component> = others.iter().collect();
+        let state = self.state(&others, Some(kappa));
+        let cell = components[i].cell;
+        let again = others.iter().any(|other| other.cell == cell);
+        let prior = if again { 0.0 } else { self.cells[cell].log_prior };
+        prior + self.log_evidence(&components[i], &state, &others)
+    }
+
+    /// ln of the evidence of a component's cell, its refined shape among the others.
+    pub fn log_evidence(&self, own: &Component, state: &State, others: &[&Component]) -> f64 {
+        let grid = self.closely(own.cell, state, others).map_or(f64::NEG_INFINITY, |found| found.log);
+        self.of_component(own, state, others).map_or(grid, |(log, _)| grid.max(log))
+    }
+
+    /// Exchanges components for cells that say more in their place.
+    pub fn swap(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+        const ROUNDS: usize = 8;
+        let key = |components: &[Component]| {
+            let mut cells: Vec<usize> = components.iter().map(|own| own.cell).collect();
+            cells.sort_unstable();
+            cells
+        };
+        let mut seen = BTreeSet::from([key(&components)]);
+        'rounds: for _ in 0..ROUNDS {
+            self.know(&components);
+            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let mut order: Vec<usize> = (0..components.len()).collect();
+            order.sort_by(|a, b| components[*a].amplitude.total_cmp(&components[*b].amplitude));
+            for i in order {
+                let own = components[i].cell;
+                let others = without(&components, &[i]);
+                let rest: Vec<&Component> = others.iter().collect();
+                let state = self.state(&rest, Some(kappa));
+                let scan = self.scan(&state, &rest, 5, &[own]);
+                let Some(best) = scan.best() else { continue };
+                let again = rest.iter().any(|other| other.cell == own);
+                let prior = if again { 0.0 } else { self.cells[own].log_prior };
+                let stays = prior + self.log_evidence(&components[i], &state, &rest);
+                if best == own || scan.log_odds[best] <= stays + *SWAPS {
+                    continue;
+                }
+                let found = scan.closely[&best].clone();
+                let new = self.component(best, &found);
+                let mut next = others.clone();
+                next.push(new);
+                let next = self.backfit(next, 1);
+                if seen.insert(key(&next)) {
+                    components = next;
+                    continue 'rounds;
+                }
+            }
+            break;
+        }
+        self.prune(components)
+    }
+
+    /// ln of the posterior of a set of components, up to a constant, at a noise.
+    fn total(&self, components: &[Component], kappa: f64) -> f64 {
+        let state = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
+        let mut prior = 0.0;
+        for (i, own) in components.iter().enumerate() {
+            let first = !components[..i].iter().any(|other| other.cell == own.cell);
+            prior += if first { self.cells[own.cell].log_prior } else { 0.0 };
+            prior += own.shape.log_weight - (AMPLITUDES as f64).ln();
+        }
+        let half = 0.5 * (state.rows.freedom + *NU);
+        prior - state.log_determinant() - half * (*NU + state.rows.square).ln()
+    }
+
+    /// A free curve of a joint's own angle that up to three waves replace is a gear's.
+    pub fn periodic(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+        const WAVES: usize = 3;
+        let curves: Vec<u64> = components.iter().filter(|own| self.is_own_curve(own)).map(|own| own.id).collect();
+        for id in curves {
+            let Some(at) = components.iter().position(|own| own.id == id) else { continue };
+            let place = self.cells[components[at].cell].place;
+            let gear = |cell: &Cell| cell.place == place && cell.key.starts_with(crate::effect::names::GEAR_CYCLIC);
+            let Some(gear) = self.cells.iter().position(gear) else { continue };
+            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
+            let before = self.total(&components, kappa);
+            let mut next = without(&components, &[at]);
+            for _ in 0..WAVES {
+                let rest: Vec<&Component> = next.iter().collect();
+                let state = self.state(&rest, Some(kappa));
+                let Some(mut found) = self.closely(gear, &state, &rest) else { break };
+                found.refined = self.refined(gear, &found, &state, &rest);
+                next.push(self.component(gear, &found));
+                next = self.backfit(next, 1);
+                if self.total(&next, kappa) > before {
+                    components = next;
+                    break;
+                }
+            }
+        }
+        self.know(&components);
+        components
+    }
+
+    fn is_own_curve(&self, own: &Component) -> bool {
+        let Shapes::Free(free) = &self.cells[own.cell].shapes else { return false };
+        let crate::effect::Motion::Joint { joint } = free.motion else { return false };
+        free.of == Variable::Angle { joint } && matches!(free.over, super::cell::Over::Curve { .. })
+    }
+
+    /// Motions over a variable that show, whose products are not cells yet.
+    pub fn shown(&self, components: &[Component]) -> Vec<FreeShape> {
+        // What has become a product still shows by its first variable.
+        let products = components.iter().filter_map(|own| match &self.cells[own.cell].shapes {
+            Shapes::Free(free) if matches!(free.over, super::cell::Over::Product(_)) => Some((free.motion, free.of)),
+            _ => None,
+        });
+        let products: Vec<_> = products.collect();
+        let stays = |shown: &&FreeShape| products.iter().any(|(motion, of)| *motion == shown.motion && *of == shown.of);
+        let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
+        for own in components {
+            let free = match &self.cells[own.cell].shapes {
+                Shapes::Free(free) if !matches!(free.over, super::cell::Over::Product(_)) => Some(*free),
+                Shapes::Free(_) => None,
+                Shapes::Listed(_) => own.forms.first().and_then(|form| {
+                    let term = form.term().filter(|term| term.law().times.is_none())?;
+                    let of = term.law().first.of;
+                    Some(FreeShape { motion: term.motion(), of, over: super::cell::Over::Line }).filter(|_| of.is_single())
+                }),
+            };
+            if let Some(free) = free
+                && !out.iter().any(|other| other.motion == free.motion && other.of == free.of)
+            {
+                out.push(free);
+            }
+        }
+        out
+    }
+}
+
+/// Whether a form is a wave of whole periods a turn.
+fn is_whole_order(form: &Form) -> bool {
+    matches!(form.term().map(|term| term.basis()), Some(Basis::Wave { .. }))
+}
+
+/// Components without some of them.
+pub(super) fn without(components: &[Component], out: &[usize]) -> Vec<Component> {
+    (0..components.len()).filter(|i| !out.contains(i)).map(|i| components[i].clone()).collect()
+}

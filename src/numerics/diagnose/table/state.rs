@@ -1,0 +1,245 @@
+//! What is in the model, as a part of the covariance of the rows: everything else is seen through its inverse.
+//!
+//! With the components' columns Z of unit prior variance and noise kappa^2: X' C^-1 X = (X'X - X'Z (kappa^2 + Z'Z)^-1 Z'X) / kappa^2, so that a
+//! component is left out, or another one put in, without a pass over the rows.
+
+use super::cell::{Shape, ShapeGroup};
+use super::evidence::{GroupEvidence, Rows, evidence};
+use super::frame::{Columns, Frame, product, view};
+use crate::criteria::cells::NU;
+use crate::effect::Form;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A group of shapes with its columns.
+pub(super) struct SeenGroup {
+    pub group: ShapeGroup,
+    /// Its columns among those of its block.
+    pub range: Range<usize>,
+    /// Columns of each form.
+    pub counts: Vec<usize>,
+    gram: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+/// All shapes of a cell with their columns.
+pub(super) struct Block {
+    pub groups: Vec<SeenGroup>,
+    pub columns: Columns,
+}
+
+impl Block {
+    pub fn of(groups: Vec<ShapeGroup>, frame: &Frame) -> Self {
+        let forms: Vec<Form> = groups.iter().flat_map(|group| group.forms.iter().cloned()).collect();
+        let (columns, counts) = frame.columns(&forms);
+        let (mut first, mut counts) = (0, counts.into_iter());
+        let seen = |mut group: ShapeGroup| {
+            let counts: Vec<usize> = counts.by_ref().take(group.forms.len()).collect();
+            let count: usize = counts.iter().sum();
+            let range = first..first + count;
+            first += count;
+            for shape in group.shapes.iter_mut().filter(|shape| shape.shares.is_empty()) {
+                shape.shares = vec![1.0 / count.max(1) as f64; count];
+            }
+            let own = columns.values.columns(range.start, count).into_owned();
+            let (gram, gradient) = (product(view(&own), view(&own)), frame.along(&own));
+            SeenGroup { group, range, counts, gram, gradient }
+        };
+        Self { groups: groups.into_iter().map(seen).collect(), columns }
+    }
+}
+
+/// A cell of the model: its forms in one shape, at an amplitude.
+#[derive(Clone)]
+pub(super) struct Component {
+    /// Its columns are those of another component with the same number.
+    pub id: u64,
+    pub cell: usize,
+    pub forms: Vec<Form>,
+    pub counts: Vec<usize>,
+    pub shape: Shape,
+    /// Whether, and up to which size, its coefficients are positive.
+    pub group: Arc<ShapeGroup>,
+    pub values: Arc<DMatrix<f64>>,
+    pub square: Arc<Vec<f64>>,
+    /// Rms motion at the tool, m.
+    pub amplitude: f64,
+}
+
+impl Component {
+    /// Roots of the prior variances of its columns.
+    fn roots(&self) -> impl Iterator<Item = f64> + '_ {
+        self.shape.shares.iter().map(|share| self.amplitude * share.sqrt())
+    }
+
+    /// Prior standard deviations of its coefficients, SI.
+    pub fn sigmas(&self) -> Vec<f64> {
+        let scale = |square: &f64| if *square > 0.0 { square.sqrt().recip() } else { 0.0 };
+        self.roots().zip(self.square.iter()).map(|(root, square)| root * scale(square)).collect()
+    }
+}
+
+/// Some components in the covariance.
+pub(super) struct State {
+    /// Standard deviation of the noise over what is stated.
+    pub kappa: f64,
+    /// What is left, seen through the covariance.
+    pub rows: Rows,
+    /// Which components, by their numbers, with their columns' roots of prior variances.
+    pub components: Vec<(u64, Vec<f64>)>,
+    factor: Cholesky<f64, nalgebra::Dyn>,
+    /// L^-1 Z'r.
+    along: DVector<f64>,
+}
+
+impl State {
+    /// Components with the noise that fits them, or with a stated one.
+    pub fn of(components: &[&Component], frame: &Frame, kappa: Option<f64>) -> Self {
+        let count: usize = components.iter().map(|own| own.shape.shares.len()).sum();
+        let mut z = DMatrix::zeros(frame.residual_rows(), count);
+        let mut at = 0;
+        for own in components {
+            for (column, root) in own.values.column_iter().zip(own.roots()) {
+                z.column_mut(at).axpy(root, &column, 0.0);
+                at += 1;
+            }
+        }
+        let (gram, along) = (product(view(&z), view(&z)), frame.along(&z));
+        let rows = frame.rows();
+        let solved = |square: f64| {
+            let matrix = &gram + DMatrix::identity(count, count) * square;
+            let factor = Cholesky::new(matrix).unwrap_or_else(|| Cholesky::new(DMatrix::identity(count, count)).expect("one"));
+            let mut solved = along.clone();
+            factor.l_dirty().solve_lower_triangular_mut(&mut solved);
+            (factor, solved)
+        };
+        let mut square = kappa.map_or(1.0, |kappa| kappa * kappa);
+        let (mut factor, mut solved_along) = solved(square);
+        if kappa.is_none() {
+            for _ in 0..30 {
+                let left = (rows.square - solved_along.norm_squared()).max(0.0);
+                let next = ((*NU + left) / (*NU + rows.freedom)).max(0.09);
+                let done = (next.sqrt() - square.sqrt()).abs() < 1e-4 * square.sqrt();
+                square = next;
+                (factor, solved_along) = solved(square);
+                if done {
+                    break;
+                }
+            }
+        }
+        let left = (rows.square - solved_along.norm_squared()).max(0.0) / square;
+        Self {
+            kappa: square.sqrt(),
+            rows: Rows { square: left, ..rows },
+            components: components.iter().map(|own| (own.id, own.roots().collect())).collect(),
+            factor,
+            along: solved_along,
+        }
+    }
+
+    /// The likeliest coefficients (SI) of the components, one component after another.
+    pub fn coefficients(&self, components: &[&Component]) -> Vec<Vec<f64>> {
+        let mut weights = self.along.clone();
+        self.factor.l_dirty().tr_solve_lower_triangular_mut(&mut weights);
+        let mut weights = weights.iter();
+        let of = |own: &&Component| {
+            let sigmas = own.sigmas();
+            sigmas.iter().zip(weights.by_ref()).map(|(sigma, weight)| sigma * weight).collect()
+        };
+        components.iter().map(of).collect()
+    }
+
+    /// Half of ln of the determinant of the covariance over that of the noise.
+    pub fn log_determinant(&self) -> f64 {
+        let count = self.along.len() as f64;
+        let lower = self.factor.l_dirty();
+        (0..self.along.len()).map(|k| lower[(k, k)].ln()).sum::<f64>() - count * self.kappa.ln()
+    }
+
+    /// Gram matrix and gradient of a group seen through the covariance; `across` are the products of the components' columns, times the roots
+    /// of their variances, with those of the group.
+    fn seen(&self, group: &SeenGroup, across: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let square = self.kappa * self.kappa;
+        if self.along.is_empty() {
+            return (&group.gram / square, &group.gradient / square);
+        }
+        let mut solved = across.columns(group.range.start, group.range.len()).into_owned();
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut solved);
+        let gram = (&group.gram - solved.tr_mul(&solved)) / square;
+        let gradient = (&group.gradient - solved.tr_mul(&self.along)) / square;
+        (gram, gradient)
+    }
+
+    /// The products of the components' columns with those of a block, from those of each component.
+    pub fn across(&self, of: impl Fn(u64) -> Arc<DMatrix<f64>>, columns: usize) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.along.len(), columns);
+        let mut at = 0;
+        for (id, roots) in &self.components {
+            let own = of(*id);
+            for (k, root) in roots.iter().enumerate() {
+                for j in 0..columns {
+                    out[(at + k, j)] = root * own[(k, j)];
+                }
+            }
+            at += roots.len();
+        }
+        out
+    }
+
+    /// Standard error of each coefficient (SI) of a block of one group beside the components.
+    pub fn errors(&self, block: &Block, across: &DMatrix<f64>) -> Vec<f64> {
+        let [group] = &block.groups[..] else { return Vec::new() };
+        let (gram, _) = self.seen(group, across);
+        let inverse = gram.try_inverse();
+        let of = |k: usize| {
+            let variance = inverse.as_ref().map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
+            let square = block.columns.square[group.range.start + k];
+            if variance > 0.0 && square > 0.0 { (variance / square).sqrt() } else { f64::INFINITY }
+        };
+        (0..group.range.len()).map(of).collect()
+    }
+
+    /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.
+    pub fn bound(&self, block: &Block, across: &DMatrix<f64>) -> f64 {
+        let (whole, half) = (*NU + self.rows.square, 0.5 * (self.rows.freedom + *NU));
+        let mut most = f64::NEG_INFINITY;
+        for group in &block.groups {
+            let (gram, gradient) = self.seen(group, across);
+            let fit = match gradient.len() {
+                1 => gradient[0] * gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE),
+                _ => {
+                    let count = gradient.len();
+                    // What is all but unseen cannot be told from rounding.
+                    let least = 1e-9 * gram.trace().max(f64::MIN_POSITIVE);
+                    let factor = Cholesky::new(gram + DMatrix::identity(count, count) * least);
+                    factor.map_or(self.rows.square, |factor| gradient.dot(&factor.solve(&gradient)))
+                }
+            };
+            let log = -half * (1.0 - (fit / whole).min(1.0 - 1e-9)).ln();
+            let weight = group.group.shapes.iter().map(|shape| shape.log_weight).fold(f64::NEG_INFINITY, f64::max);
+            most = most.max(log + weight.max(-3.0));
+        }
+        most
+    }
+
+    /// What each group of a block says: for every shape ln of its evidence with its weight, and its amplitude; nothing of a shape whose
+    /// coefficient would have a size that it cannot have.
+    pub fn shapes(&self, block: &Block, across: &DMatrix<f64>, mut each: impl FnMut(usize, usize, GroupEvidence)) {
+        for (g, group) in block.groups.iter().enumerate() {
+            let (gram, gradient) = self.seen(group, across);
+            let single = gradient.len() == 1;
+            if single {
+                let coefficient = gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE) / block.columns.square[group.range.start].sqrt();
+                let wrong = group.group.positive && coefficient < 0.0;
+                if wrong || coefficient.abs() > 1.5 * group.group.largest {
+                    continue;
+                }
+            }
+            for (s, shape) in group.group.shapes.iter().enumerate() {
+                let found = evidence(&gram, &gradient, &shape.shares, self.rows);
+                each(g, s, GroupEvidence { log: found.log + shape.log_weight, ..found });
+            }
+        }
+    }
+}
