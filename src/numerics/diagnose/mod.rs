@@ -37,8 +37,8 @@ pub use verdict::other_means;
 
 use crate::criteria::cells::SETTLED;
 use crate::criteria::search::FEWEST;
-use round::{Fitter, RoundView, correlation_left_by};
-use table::Rounds;
+use round::{FitState, Fitter, RoundView, correlation_left_by};
+use table::{Answer, FoundCause, Rounds};
 use verdict::{LastRound, conclude};
 
 /// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
@@ -76,10 +76,26 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             rounds.again();
             continue;
         }
-        let next = fitter.held_to_a_common_size(next);
+        let (next, answer) = without_empty(fitter.held_to_a_common_size(next), answer, &fitter);
         tell(words::of_the_conclusions(&next));
         let survey = view.survey();
         let last = LastRound { view: &view, survey: &survey, state: next, answer, scale: fitter.scale, without: question.without };
         return conclude(last, &fitter, &before);
     }
+}
+
+/// The model without findings that are smaller than their own uncertainty in the whole model: the search saw a linear picture of each.
+fn without_empty(state: FitState, mut answer: Answer, fitter: &Fitter) -> (FitState, Answer) {
+    let is_empty = |found: &FoundCause| state.square_size(&found.members).is_some_and(|size| size < 1.0);
+    let gone: Vec<usize> = answer.found.iter().filter(|found| is_empty(found)).flat_map(|found| found.members.clone()).collect();
+    if gone.is_empty() || state.screening.apart.is_some() {
+        return (state, answer);
+    }
+    let kept: Vec<usize> = (0..state.causes.len()).filter(|i| !gone.contains(i)).collect();
+    let causes = kept.iter().map(|i| state.causes[*i].clone()).collect();
+    answer.found.retain(|found| !found.members.iter().any(|i| gone.contains(i)));
+    for member in answer.found.iter_mut().flat_map(|found| &mut found.members) {
+        *member = kept.iter().position(|i| i == member).unwrap_or(*member);
+    }
+    (fitter.fit(&state.model, causes), answer)
 }

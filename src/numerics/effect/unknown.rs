@@ -251,20 +251,26 @@ impl Cause for Unknown {
             of => of.to_string().replace(' ', "_"),
         };
         let names: Vec<String> = term.law().variables().iter().map(label).collect();
+        let shape = match term.basis() {
+            Basis::Linear { .. } => "_line".into(),
+            Basis::After { at } => format!("_after_{at:.0}"),
+            _ => String::new(),
+        };
         if let Motion::Instrument { of } = term.motion() {
-            return format!("{of:?}_{}", names.join("_")).to_lowercase();
+            return format!("{of:?}_{}{shape}", names.join("_")).to_lowercase();
         }
         let curve = term.law().factors().any(|factor| factor.basis.is_curve());
         let moves = match term.motion() {
             Motion::Slide { along: true, .. } => "along_",
             Motion::Slide { .. } => "across_",
             Motion::Bend { .. } => "bent_",
-            Motion::Axis { .. } if curve => "axis_",
-            Motion::Base { axes: Axes::Rotation } if curve => "turned_",
+            Motion::Axis { turning: true, .. } => "axis_turning_",
+            Motion::Axis { .. } => "axis_",
+            Motion::Base { axes: Axes::Rotation } => "turned_",
             _ => "",
         };
         if !moves.is_empty() || curve && term.law().times.is_some() {
-            return format!("{moves}{}", names.join("_"));
+            return format!("{moves}{}{shape}", names.join("_"));
         }
         let frame = !matches!(term.motion(), Motion::Joint { .. });
         match (term.basis(), term.law().first.of) {
@@ -280,11 +286,11 @@ impl Cause for Unknown {
             (_, Variable::Gravity { .. }) => "sag".into(),
             (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),
             (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
+            (_, Variable::Temperature) if curve => "warm_curve".into(),
             (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "warm".into(),
             (_, Variable::Payload) => "payload".into(),
-            (_, Variable::Approach { .. } | Variable::Load { .. }) => names.join("_"),
-            _ if frame && !term.basis().is_curve() => String::new(),
-            _ => names.join("_"),
+            (_, Variable::Approach { .. } | Variable::Load { .. }) => format!("{}{shape}", names.join("_")),
+            _ => format!("{}{shape}", names.join("_")),
         }
     }
 

@@ -7,11 +7,9 @@ use super::listed::cell_of;
 use super::search::{Scan, Table, without};
 use super::state::{Block, Component, State};
 use crate::criteria::cells::{MISLED, RIVAL};
-use crate::diagnose::pool::dot;
 use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// One finding of a search.
 #[derive(Clone)]
@@ -127,7 +125,7 @@ impl Table<'_, '_> {
             members: Vec::new(),
             log,
             gain: (state.rows.square - with.rows.square).max(0.0),
-            numbers: members.iter().map(|i| components[*i].shape.shares.len()).sum(),
+            numbers: members.iter().map(|i| components[*i].part.ncols()).sum(),
             probabilities,
             rivals,
             bounds,
@@ -181,10 +179,10 @@ impl Table<'_, '_> {
         let mut best: BTreeMap<(&'static str, String), ExplainedShare> = BTreeMap::new();
         let mut lines: BTreeMap<(usize, bool, u32), f64> = BTreeMap::new();
         let clock = Clock::of(self.survey.data);
+        let across = self.across(state);
         for (k, cell) in self.cells.iter().enumerate() {
             let block = &self.coarse[k];
-            let across = state.across(|id| self.products[&id][k].clone(), block.columns.values.ncols());
-            state.shapes(block, &across, |group, shape, found| {
+            state.shapes(block, &across, self.first[k], |group, shape, found| {
                 let seen = &block.groups[group];
                 let share = found.fit / state.rows.square.max(f64::MIN_POSITIVE);
                 let parameters = seen.group.shapes[shape].shares.iter().filter(|share| **share > 0.0).count();
@@ -229,16 +227,7 @@ impl Table<'_, '_> {
                     continue;
                 }
                 let block = Block::of(vec![group.clone()], self.frame);
-                let columns = block.columns.values.ncols();
-                let with = |own: &Component| {
-                    let dots = |(i, j): (usize, usize)| {
-                        dot(own.values.column(i).as_slice(), block.columns.values.column(j).as_slice())
-                    };
-                    Arc::new(nalgebra::DMatrix::from_fn(own.values.ncols(), columns, |i, j| dots((i, j))))
-                };
-                let products: BTreeMap<u64, Arc<nalgebra::DMatrix<f64>>> =
-                    components.iter().map(|own| (own.id, with(own))).collect();
-                let across = state.across(|id| products[&id].clone(), columns);
+                let across = self.across_block(&block, state, components);
                 out.extend(state.errors(&block, &across).first().map(|error| (form.clone(), *error)));
             }
         }

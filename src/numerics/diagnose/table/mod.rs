@@ -110,7 +110,7 @@ impl Rounds {
 /// show are left out.
 fn estimated(table: &Table, components: &[Component]) -> Vec<EstimatedCause> {
     let all: Vec<&Component> = components.iter().collect();
-    let coefficients = table.state(&all, None).coefficients(&all);
+    let coefficients = table.state(&all, None).coefficients(&all, table.frame);
     let mut out = Vec::new();
     for (own, coefficients) in components.iter().zip(coefficients) {
         let sigmas = own.sigmas();

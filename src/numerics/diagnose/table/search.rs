@@ -24,7 +24,10 @@ pub(super) struct Table<'f, 'a> {
     pub coarse: Vec<Block>,
     fine: Vec<OnceLock<Block>>,
     /// Products of the columns of each component with those of every coarse block.
-    pub products: BTreeMap<u64, Vec<Arc<DMatrix<f64>>>>,
+    products: BTreeMap<u64, DMatrix<f64>>,
+    /// The first of all coarse columns of each cell, and their number.
+    pub first: Vec<usize>,
+    columns: usize,
     next: u64,
     /// Motions and variables whose products with others are cells.
     multiplied: Vec<FreeShape>,
@@ -90,7 +93,14 @@ impl<'f, 'a> Table<'f, 'a> {
         let coarse: Vec<Block> =
             named.par_iter().map(|cell| Block::of(cell.groups(survey, &values, false), frame)).collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
-        Self { frame, survey, cells: named, coarse, fine, products: BTreeMap::new(), next: 0, multiplied: shown.to_vec() }
+        let mut columns = 0;
+        let mut first = Vec::with_capacity(coarse.len());
+        for block in &coarse {
+            first.push(columns);
+            columns += block.columns.values.ncols();
+        }
+        let products = BTreeMap::new();
+        Self { frame, survey, cells: named, coarse, fine, products, first, columns, next: 0, multiplied: shown.to_vec() }
     }
 
     /// The cell of a key.
@@ -112,14 +122,44 @@ impl<'f, 'a> Table<'f, 'a> {
     pub fn know(&mut self, components: &[Component]) {
         for own in components {
             if !self.products.contains_key(&own.id) {
-                let with = |block: &Block| Arc::new(product(view(&own.values), view(&block.columns.values)));
-                self.products.insert(own.id, self.coarse.par_iter().map(with).collect());
+                let with = |block: &Block| product(view(&own.part), view(&block.columns.values));
+                let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
+                let values: Vec<f64> = all.iter().flat_map(|products| products.iter().copied()).collect();
+                self.products.insert(own.id, DMatrix::from_vec(own.part.ncols(), self.columns, values));
             }
         }
         let known: BTreeSet<u64> = components.iter().map(|own| own.id).collect();
-        if self.products.len() > 4 * *COMPONENTS {
+        if self.products.len() > 3 * *COMPONENTS {
             self.products.retain(|id, _| known.contains(id));
         }
+    }
+
+    /// L^-1 Z'X of all coarse columns beside a state.
+    pub fn across(&self, state: &State) -> DMatrix<f64> {
+        let parts: Vec<&DMatrix<f64>> = state.components.iter().map(|id| &self.products[id]).collect();
+        let rows = parts.iter().map(|part| part.nrows()).sum();
+        let mut values = Vec::with_capacity(rows * self.columns);
+        for column in 0..self.columns {
+            for part in &parts {
+                let count = part.nrows();
+                values.extend_from_slice(&part.as_slice()[column * count..(column + 1) * count]);
+            }
+        }
+        state.solved(DMatrix::from_vec(rows, self.columns, values))
+    }
+
+    /// The same of a block's columns, from the components that the state has.
+    pub fn across_block(&self, block: &Block, state: &State, components: &[&Component]) -> DMatrix<f64> {
+        let parts: Vec<DMatrix<f64>> = components.iter().map(|own| product(view(&own.part), view(&block.columns.values))).collect();
+        let rows = parts.iter().map(DMatrix::nrows).sum();
+        let columns = block.columns.values.ncols();
+        let mut values = Vec::with_capacity(rows * columns);
+        for column in 0..columns {
+            for part in &parts {
+                values.extend(part.column(column).iter().copied());
+            }
+        }
+        state.solved(DMatrix::from_vec(rows, columns, values))
     }
 
     pub fn state(&self, components: &[&Component], kappa: Option<f64>) -> State {
@@ -129,17 +169,13 @@ impl<'f, 'a> Table<'f, 'a> {
     /// The evidence of a cell in all of its shapes beside a state of some components.
     pub fn closely(&self, cell: usize, state: &State, components: &[&Component]) -> Option<CellEvidence> {
         let block = self.fine(cell);
-        let products: BTreeMap<u64, Arc<DMatrix<f64>>> = components
-            .iter()
-            .map(|own| (own.id, Arc::new(product(view(&own.values), view(&block.columns.values)))))
-            .collect();
-        let across = state.across(|id| products[&id].clone(), block.columns.values.ncols());
+        let across = self.across_block(block, state, components);
         let mut all: Vec<(f64, usize, usize, f64)> = Vec::new();
         // A model holds every number once, by its name.
         let keys: BTreeSet<String> = components.iter().flat_map(|own| &own.forms).map(Form::key).collect();
         let is_there = |group: usize| block.groups[group].group.forms.iter().any(|form| keys.contains(&form.key()));
         let there: Vec<bool> = (0..block.groups.len()).map(|group| !keys.is_empty() && is_there(group)).collect();
-        state.shapes(block, &across, |group, shape, found| {
+        state.shapes(block, &across, 0, |group, shape, found| {
             if !there[group] {
                 all.push((found.log, group, shape, found.amplitude));
             }
@@ -159,12 +195,12 @@ impl<'f, 'a> Table<'f, 'a> {
         let prior = |cell: usize| {
             if components.iter().any(|own| own.cell == cell) { 0.0 } else { self.cells[cell].log_prior }
         };
-        let across = |cell: usize| state.across(|id| self.products[&id][cell].clone(), self.coarse[cell].columns.values.ncols());
-        let bound = |cell: usize| prior(cell) + state.bound(&self.coarse[cell], &across(cell));
+        let across = self.across(state);
+        let bound = |cell: usize| prior(cell) + state.bound(&self.coarse[cell], &across, self.first[cell]);
         let bounds: Vec<f64> = (0..self.cells.len()).into_par_iter().map(bound).collect();
         let coarse = |cell: usize| {
             let mut logs = Vec::new();
-            state.shapes(&self.coarse[cell], &across(cell), |_, _, found| logs.push(found.log));
+            state.shapes(&self.coarse[cell], &across, self.first[cell], |_, _, found| logs.push(found.log));
             prior(cell) + log_sum(&logs)
         };
         let mut promising: Vec<usize> = (0..self.cells.len()).collect();
@@ -219,9 +255,11 @@ impl<'f, 'a> Table<'f, 'a> {
 
     /// The component that a cell is in a scan.
     fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
-        self.next += 1;
         let own = self.as_found(cell, found);
-        let Some((form, _, amplitude)) = found.refined.clone() else { return Component { id: self.next, ..own } };
+        let Some((form, _, amplitude)) = found.refined.clone() else {
+            self.next += 1;
+            return own.with_part(self.next);
+        };
         let own = Component { forms: vec![form], amplitude, ..own };
         self.component_of(&own, cell)
     }
@@ -258,6 +296,7 @@ impl<'f, 'a> Table<'f, 'a> {
             values: Arc::new(values),
             square: Arc::new(square),
             amplitude: found.amplitude,
+            part: Arc::default(),
         }
     }
 
@@ -265,14 +304,8 @@ impl<'f, 'a> Table<'f, 'a> {
     pub fn component_of(&mut self, before: &Component, cell: usize) -> Component {
         self.next += 1;
         let (columns, counts) = self.frame.columns(&before.forms);
-        Component {
-            id: self.next,
-            cell,
-            counts,
-            values: Arc::new(columns.values),
-            square: Arc::new(columns.square),
-            ..before.clone()
-        }
+        let (values, square) = (Arc::new(columns.values), Arc::new(columns.square));
+        Component { cell, counts, values, square, ..before.clone() }.with_part(self.next)
     }
 
     /// ln of the evidence of one shape with its weight beside a state, and its amplitude.
@@ -280,13 +313,9 @@ impl<'f, 'a> Table<'f, 'a> {
         let mut group = (*own.group).clone();
         group.forms.clone_from(&own.forms);
         let block = Block::of(vec![group], self.frame);
-        let products: BTreeMap<u64, Arc<DMatrix<f64>>> = others
-            .iter()
-            .map(|other| (other.id, Arc::new(product(view(&other.values), view(&block.columns.values)))))
-            .collect();
-        let across = state.across(|id| products[&id].clone(), block.columns.values.ncols());
+        let across = self.across_block(&block, state, others);
         let mut found = None;
-        state.shapes(&block, &across, |_, _, own| found = Some((own.log, own.amplitude)));
+        state.shapes(&block, &across, 0, |_, _, own| found = Some((own.log, own.amplitude)));
         found
     }
 
@@ -339,14 +368,21 @@ impl<'f, 'a> Table<'f, 'a> {
                 let state = self.state(&others, Some(kappa));
                 let own = self.of_component(&components[i], &state, &others);
                 let Some(own) = own else { continue };
-                (components[i].amplitude, changed) = (own.1, changed || components[i].amplitude != own.1);
+                let before = (components[i].amplitude, components[i].shape.shares.clone());
+                components[i].amplitude = own.1;
                 let Some(mut grid) = self.closely(components[i].cell, &state, &others) else { continue };
                 let found = self.as_found(components[i].cell, &grid);
-                if found.forms == components[i].forms && found.shape.shares.len() == components[i].shape.shares.len() {
-                    changed |= components[i].shape.shares != found.shape.shares;
-                    components[i].shape = found.shape;
-                    components[i].group = found.group;
-                    components[i].amplitude = found.amplitude;
+                let same = found.forms == components[i].forms && found.shape.shares.len() == components[i].shape.shares.len();
+                if same {
+                    let Component { shape, group, amplitude, .. } = found.clone();
+                    components[i] = Component { shape, group, amplitude, ..components[i].clone() };
+                }
+                if before != (components[i].amplitude, components[i].shape.shares.clone()) {
+                    self.next += 1;
+                    components[i] = components[i].clone().with_part(self.next);
+                    changed = true;
+                }
+                if same {
                     continue;
                 }
                 let Some(other) = self.of_component(&found, &state, &others) else { continue };

@@ -7,7 +7,11 @@ use super::cell::{Shape, ShapeGroup};
 use super::evidence::{GroupEvidence, Rows, evidence};
 use super::frame::{Columns, Frame, product, view};
 use crate::criteria::cells::NU;
+use crate::diagnose::pool::dot;
 use crate::effect::Form;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, Mat, MatMut, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -53,7 +57,7 @@ impl Block {
 /// A cell of the model: its forms in one shape, at an amplitude.
 #[derive(Clone)]
 pub(super) struct Component {
-    /// Its columns are those of another component with the same number.
+    /// Components of the same number have the same part in the covariance.
     pub id: u64,
     pub cell: usize,
     pub forms: Vec<Form>,
@@ -65,7 +69,12 @@ pub(super) struct Component {
     pub square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
     pub amplitude: f64,
+    /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
+    pub part: Arc<DMatrix<f64>>,
 }
+
+/// Prior variance of a direction, in that of the noise, below which no row shows it.
+const UNSEEN: f64 = 0.01;
 
 impl Component {
     /// Roots of the prior variances of its columns.
@@ -78,6 +87,23 @@ impl Component {
         let scale = |square: &f64| if *square > 0.0 { square.sqrt().recip() } else { 0.0 };
         self.roots().zip(self.square.iter()).map(|(root, square)| root * scale(square)).collect()
     }
+
+    /// With its part in the covariance.
+    pub fn with_part(self, id: u64) -> Self {
+        let mut scaled = (*self.values).clone();
+        scaled.column_iter_mut().zip(self.roots()).for_each(|(mut column, root)| column *= root);
+        if scaled.ncols() > 2 {
+            let own = product(view(&scaled), view(&scaled)).symmetric_eigen();
+            let seen: Vec<usize> = (0..own.eigenvalues.len()).filter(|k| own.eigenvalues[*k] > UNSEEN).collect();
+            let kept = if seen.is_empty() { vec![own.eigenvalues.imax()] } else { seen };
+            let directions = own.eigenvectors.select_columns(kept.iter());
+            let mut part = DMatrix::zeros(scaled.nrows(), kept.len());
+            let out = MatMut::from_column_major_slice_mut(part.as_mut_slice(), scaled.nrows(), kept.len());
+            matmul(out, Accum::Replace, view(&scaled), view(&directions), 1.0, Par::Seq);
+            scaled = part;
+        }
+        Self { id, part: Arc::new(scaled), ..self }
+    }
 }
 
 /// Some components in the covariance.
@@ -86,9 +112,10 @@ pub(super) struct State {
     pub kappa: f64,
     /// What is left, seen through the covariance.
     pub rows: Rows,
-    /// Which components, by their numbers, with their columns' roots of prior variances.
-    pub components: Vec<(u64, Vec<f64>)>,
-    factor: Cholesky<f64, nalgebra::Dyn>,
+    /// Which components, by their numbers.
+    pub components: Vec<u64>,
+    /// Cholesky factor of kappa^2 + Z'Z.
+    lower: Mat<f64>,
     /// L^-1 Z'r.
     along: DVector<f64>,
 }
@@ -96,33 +123,26 @@ pub(super) struct State {
 impl State {
     /// Components with the noise that fits them, or with a stated one.
     pub fn of(components: &[&Component], frame: &Frame, kappa: Option<f64>) -> Self {
-        let count: usize = components.iter().map(|own| own.shape.shares.len()).sum();
-        let mut z = DMatrix::zeros(frame.residual_rows(), count);
-        let mut at = 0;
-        for own in components {
-            for (column, root) in own.values.column_iter().zip(own.roots()) {
-                z.column_mut(at).axpy(root, &column, 0.0);
-                at += 1;
-            }
-        }
+        let z = side_by_side(components, frame.residual_rows());
+        let count = z.ncols();
         let (gram, along) = (product(view(&z), view(&z)), frame.along(&z));
         let rows = frame.rows();
         let solved = |square: f64| {
-            let matrix = &gram + DMatrix::identity(count, count) * square;
-            let factor = Cholesky::new(matrix).unwrap_or_else(|| Cholesky::new(DMatrix::identity(count, count)).expect("one"));
+            let matrix = Mat::from_fn(count, count, |i, j| gram[(i, j)] + if i == j { square } else { 0.0 });
+            let lower = matrix.llt(Side::Lower).map_or_else(|_| Mat::identity(count, count), |factor| factor.L().to_owned());
             let mut solved = along.clone();
-            factor.l_dirty().solve_lower_triangular_mut(&mut solved);
-            (factor, solved)
+            solve(&lower, solved.as_mut_slice());
+            (lower, solved)
         };
         let mut square = kappa.map_or(1.0, |kappa| kappa * kappa);
-        let (mut factor, mut solved_along) = solved(square);
+        let (mut lower, mut solved_along) = solved(square);
         if kappa.is_none() {
             for _ in 0..30 {
                 let left = (rows.square - solved_along.norm_squared()).max(0.0);
                 let next = ((*NU + left) / (*NU + rows.freedom)).max(0.09);
                 let done = (next.sqrt() - square.sqrt()).abs() < 1e-4 * square.sqrt();
                 square = next;
-                (factor, solved_along) = solved(square);
+                (lower, solved_along) = solved(square);
                 if done {
                     break;
                 }
@@ -132,20 +152,24 @@ impl State {
         Self {
             kappa: square.sqrt(),
             rows: Rows { square: left, ..rows },
-            components: components.iter().map(|own| (own.id, own.roots().collect())).collect(),
-            factor,
+            components: components.iter().map(|own| own.id).collect(),
+            lower,
             along: solved_along,
         }
     }
 
-    /// The likeliest coefficients (SI) of the components, one component after another.
-    pub fn coefficients(&self, components: &[&Component]) -> Vec<Vec<f64>> {
+    /// The likeliest coefficients (SI) of its components, one component after another.
+    pub fn coefficients(&self, components: &[&Component], frame: &Frame) -> Vec<Vec<f64>> {
+        let z = side_by_side(components, frame.residual_rows());
         let mut weights = self.along.clone();
-        self.factor.l_dirty().tr_solve_lower_triangular_mut(&mut weights);
-        let mut weights = weights.iter();
+        let count = weights.len();
+        let out = MatMut::from_column_major_slice_mut(weights.as_mut_slice(), count, 1);
+        solve_upper_triangular_in_place(self.lower.transpose(), out, Par::Seq);
+        let left = DVector::from_column_slice(frame.residual()) - z * weights;
         let of = |own: &&Component| {
-            let sigmas = own.sigmas();
-            sigmas.iter().zip(weights.by_ref()).map(|(sigma, weight)| sigma * weight).collect()
+            let along = own.values.tr_mul(&left) / (self.kappa * self.kappa);
+            let scaled = own.roots().zip(own.sigmas()).zip(along.iter());
+            scaled.map(|((root, sigma), along)| sigma * root * along).collect()
         };
         components.iter().map(of).collect()
     }
@@ -153,44 +177,42 @@ impl State {
     /// Half of ln of the determinant of the covariance over that of the noise.
     pub fn log_determinant(&self) -> f64 {
         let count = self.along.len() as f64;
-        let lower = self.factor.l_dirty();
-        (0..self.along.len()).map(|k| lower[(k, k)].ln()).sum::<f64>() - count * self.kappa.ln()
+        (0..self.along.len()).map(|k| self.lower[(k, k)].ln()).sum::<f64>() - count * self.kappa.ln()
     }
 
-    /// Gram matrix and gradient of a group seen through the covariance; `across` are the products of the components' columns, times the roots
-    /// of their variances, with those of the group.
-    fn seen(&self, group: &SeenGroup, across: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    /// L^-1 Z'X by the products Z'X (components' columns down) of columns X.
+    pub fn solved(&self, mut products: DMatrix<f64>) -> DMatrix<f64> {
+        solve(&self.lower, products.as_mut_slice());
+        products
+    }
+
+    /// Gram matrix and gradient of a group seen through the covariance; `across` is L^-1 Z'X of its block from column `first` on.
+    fn seen(&self, group: &SeenGroup, across: &DMatrix<f64>, first: usize) -> (DMatrix<f64>, DVector<f64>) {
         let square = self.kappa * self.kappa;
         if self.along.is_empty() {
             return (&group.gram / square, &group.gradient / square);
         }
-        let mut solved = across.columns(group.range.start, group.range.len()).into_owned();
-        self.factor.l_dirty().solve_lower_triangular_mut(&mut solved);
-        let gram = (&group.gram - solved.tr_mul(&solved)) / square;
-        let gradient = (&group.gradient - solved.tr_mul(&self.along)) / square;
-        (gram, gradient)
-    }
-
-    /// The products of the components' columns with those of a block, from those of each component.
-    pub fn across(&self, of: impl Fn(u64) -> Arc<DMatrix<f64>>, columns: usize) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(self.along.len(), columns);
-        let mut at = 0;
-        for (id, roots) in &self.components {
-            let own = of(*id);
-            for (k, root) in roots.iter().enumerate() {
-                for j in 0..columns {
-                    out[(at + k, j)] = root * own[(k, j)];
-                }
+        let rows = across.nrows();
+        let column = |j: usize| {
+            let start = (first + group.range.start + j) * rows;
+            &across.as_slice()[start..start + rows]
+        };
+        let count = group.range.len();
+        let mut gram = group.gram.clone();
+        for j in 0..count {
+            for i in 0..=j {
+                gram[(i, j)] = (gram[(i, j)] - dot(column(i), column(j))) / square;
+                gram[(j, i)] = gram[(i, j)];
             }
-            at += roots.len();
         }
-        out
+        let gradient = DVector::from_fn(count, |j, _| (group.gradient[j] - dot(column(j), self.along.as_slice())) / square);
+        (gram, gradient)
     }
 
     /// Standard error of each coefficient (SI) of a block of one group beside the components.
     pub fn errors(&self, block: &Block, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else { return Vec::new() };
-        let (gram, _) = self.seen(group, across);
+        let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
         let of = |k: usize| {
             let variance = inverse.as_ref().map_or(f64::INFINITY, |inverse| inverse[(k, k)]);
@@ -201,11 +223,11 @@ impl State {
     }
 
     /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.
-    pub fn bound(&self, block: &Block, across: &DMatrix<f64>) -> f64 {
+    pub fn bound(&self, block: &Block, across: &DMatrix<f64>, first: usize) -> f64 {
         let (whole, half) = (*NU + self.rows.square, 0.5 * (self.rows.freedom + *NU));
         let mut most = f64::NEG_INFINITY;
         for group in &block.groups {
-            let (gram, gradient) = self.seen(group, across);
+            let (gram, gradient) = self.seen(group, across, first);
             let fit = match gradient.len() {
                 1 => gradient[0] * gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE),
                 _ => {
@@ -225,9 +247,9 @@ impl State {
 
     /// What each group of a block says: for every shape ln of its evidence with its weight, and its amplitude; nothing of a shape whose
     /// coefficient would have a size that it cannot have.
-    pub fn shapes(&self, block: &Block, across: &DMatrix<f64>, mut each: impl FnMut(usize, usize, GroupEvidence)) {
+    pub fn shapes(&self, block: &Block, across: &DMatrix<f64>, first: usize, mut each: impl FnMut(usize, usize, GroupEvidence)) {
         for (g, group) in block.groups.iter().enumerate() {
-            let (gram, gradient) = self.seen(group, across);
+            let (gram, gradient) = self.seen(group, across, first);
             let single = gradient.len() == 1;
             if single {
                 let coefficient = gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE) / block.columns.square[group.range.start].sqrt();
@@ -242,4 +264,21 @@ impl State {
             }
         }
     }
+}
+
+/// L^-1 times columns, one after another.
+fn solve(lower: &Mat<f64>, columns: &mut [f64]) {
+    let rows = lower.nrows();
+    if rows > 0 {
+        let count = columns.len() / rows;
+        let columns = MatMut::from_column_major_slice_mut(columns, rows, count);
+        solve_lower_triangular_in_place(lower.as_ref(), columns, Par::Seq);
+    }
+}
+
+/// The parts of components in the covariance as one matrix.
+fn side_by_side(components: &[&Component], rows: usize) -> DMatrix<f64> {
+    let all: Vec<f64> = components.iter().flat_map(|own| own.part.iter().copied()).collect();
+    let count = all.len() / rows.max(1);
+    DMatrix::from_vec(rows, count, all)
 }
