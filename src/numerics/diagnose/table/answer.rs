@@ -111,7 +111,7 @@ impl Table<'_, '_> {
             log += log_of(i, &beside, &known).max(0.0);
             known.push(&components[i]);
         }
-        let mut scan = self.scan(&state, &rest, 8, &[cell]);
+        let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
         scan.log_odds[cell] = self.cells[cell].log_prior + log;
         let (effect, place) = (told(&components[main], &self.cells[cell]), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);

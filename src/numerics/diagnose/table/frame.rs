@@ -19,6 +19,8 @@ pub(super) struct NoiseShape {
     weights: Vec<f64>,
     /// What makes the three numbers of a point white, in the axes of the recording.
     whitening: Option<Matrix3<f64>>,
+    /// By what motor currents are multiplied, so that they leave as much as points do.
+    currents: Option<f64>,
 }
 
 /// Columns of unit rms motion at the tool.
@@ -212,6 +214,10 @@ impl<'a> Frame<'a> {
                 column[lines].iter_mut().for_each(|value| *value *= weight);
             }
         }
+        if let Some(factor) = self.noise.currents {
+            let points = problem.of_readings().len();
+            column[points..].iter_mut().for_each(|value| *value *= factor);
+        }
     }
 }
 
@@ -244,7 +250,10 @@ impl NoiseShape {
             sum += left * left.transpose();
             count += 1.0;
         }
-        Self { weights, whitening: evened(sum, count) }
+        let mean = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64;
+        let currents = &problem.residual[residual.len()..];
+        let currents = (!currents.is_empty()).then(|| (mean(residual) / mean(currents).max(1e-12)).sqrt().clamp(0.2, 5.0));
+        Self { weights, whitening: evened(sum, count), currents }
     }
 }
 

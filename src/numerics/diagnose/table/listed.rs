@@ -62,7 +62,7 @@ pub(super) fn cells(
     }
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
         let mut groups = weighed(hypotheses);
-        groups.extend(curves(name, place, &groups, values));
+        groups.extend(curves(name, place, &groups, values, survey.joints()));
         let told = if without.iter().any(|out| out == name) { names::UNKNOWN } else { name };
         Cell { name: told, place, key: format!("{name}@{place}"), log_prior: odds(name).ln(), shapes: Shapes::Listed(groups) }
     };
@@ -94,6 +94,7 @@ fn curves(
     place: Place,
     groups: &[ShapeGroup],
     values: &dyn Fn(Variable) -> Option<Vec<f64>>,
+    joints: usize,
 ) -> Vec<ShapeGroup> {
     let Place::Joint(joint) = place else { return Vec::new() };
     let (motion, load) = (Motion::Joint { joint }, Variable::Load { joint });
@@ -128,6 +129,10 @@ fn curves(
             let count = out.iter().map(|group| group.shapes.len()).sum::<usize>().max(1) as f64;
             let shapes = out.iter_mut().flat_map(|group| &mut group.shapes);
             shapes.for_each(|shape| shape.log_weight = 0.3_f64.ln() - count.ln());
+            // About the middle of the link that the joint moves.
+            let bent = |order| Law::new(of, Basis::Wave { order, overtone: false });
+            let bent = [1, 2].map(|order| Term::new(&Unknown, Motion::Bend { link: joint }, bent(order)).into());
+            out.extend(bent.into_iter().filter(|_| joint + 1 < joints).map(|form| ShapeGroup::of(form, 0.05_f64.ln())));
             out
         }
         _ => Vec::new(),

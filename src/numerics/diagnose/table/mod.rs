@@ -68,6 +68,7 @@ impl Rounds {
         };
         let mut table = Table::new(&mut frame, &survey, question.without, question.own, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
+        table.from_before.clone_from(&before);
         let mut components = Vec::new();
         for (key, own) in std::mem::take(&mut self.components) {
             if let Some(cell) = table.cell(&key) {
@@ -79,7 +80,9 @@ impl Rounds {
             let scan = table.scan(&state, &[], 12, &[]);
             self.first = Some((table.locate(&state), answer::nothing(&scan)));
         }
-        if !components.is_empty() {
+        if components.is_empty() {
+            components = table.start();
+        } else {
             components = table.backfit(components, 1);
         }
         components = table.grow(components);

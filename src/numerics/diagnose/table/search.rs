@@ -3,10 +3,10 @@
 use super::cell::{Cell, FreeShape, Shapes};
 use super::evidence::{AMPLITUDES, log_sum};
 use super::frame::{Frame, product, view};
-use super::state::{Block, Component, State};
+use super::state::{Block, Component, PartProducts, State};
 use super::{generated, listed};
-use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SWAPS};
-use crate::effect::{Basis, DeclaredCause, Form, Survey, Variable};
+use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SECOND_ORDER, SWAPS};
+use crate::effect::{Basis, DeclaredCause, Form, Survey, Variable, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,6 +15,8 @@ use std::sync::{Arc, OnceLock};
 /// ln of odds, below the best ones, from which a cell is not asked; and below which none is.
 const FAR_BELOW: f64 = 12.0;
 const UNLIKELY: f64 = -8.0;
+/// Cells that are asked again at once when one has joined.
+const LIKELY: usize = 240;
 
 /// The table of cells over the rows of a recording.
 pub(super) struct Table<'f, 'a> {
@@ -25,10 +27,13 @@ pub(super) struct Table<'f, 'a> {
     fine: Vec<OnceLock<Block>>,
     /// Products of the columns of each component with those of every coarse block.
     products: BTreeMap<u64, DMatrix<f64>>,
+    parts: PartProducts,
     /// The first of all coarse columns of each cell, and their number.
     pub first: Vec<usize>,
     columns: usize,
     next: u64,
+    /// Keys of cells that are in the model around which the rows are looked at.
+    pub from_before: Vec<String>,
     /// Motions and variables whose products with others are cells.
     multiplied: Vec<FreeShape>,
 }
@@ -53,6 +58,8 @@ pub(super) struct Scan {
     pub log_odds: Vec<f64>,
     /// Of those that were asked closely.
     pub closely: BTreeMap<usize, CellEvidence>,
+    /// All that were asked, the most promising first.
+    order: Vec<usize>,
 }
 
 impl Scan {
@@ -100,7 +107,7 @@ impl<'f, 'a> Table<'f, 'a> {
             columns += block.columns.values.ncols();
         }
         let products = BTreeMap::new();
-        Self { frame, survey, cells: named, coarse, fine, products, first, columns, next: 0, multiplied: shown.to_vec() }
+        Self { frame, survey, cells: named, coarse, fine, products, parts: PartProducts::default(), first, columns, next: 0, from_before: Vec::new(), multiplied: shown.to_vec() }
     }
 
     /// The cell of a key.
@@ -136,16 +143,56 @@ impl<'f, 'a> Table<'f, 'a> {
 
     /// L^-1 Z'X of all coarse columns beside a state.
     pub fn across(&self, state: &State) -> DMatrix<f64> {
+        let all: Vec<usize> = (0..self.cells.len()).collect();
+        self.across_cells(&all, state).0
+    }
+
+    /// The same of some cells, with the first column of each.
+    fn across_cells(&self, cells: &[usize], state: &State) -> (DMatrix<f64>, Vec<usize>) {
         let parts: Vec<&DMatrix<f64>> = state.components.iter().map(|id| &self.products[id]).collect();
-        let rows = parts.iter().map(|part| part.nrows()).sum();
-        let mut values = Vec::with_capacity(rows * self.columns);
-        for column in 0..self.columns {
-            for part in &parts {
-                let count = part.nrows();
-                values.extend_from_slice(&part.as_slice()[column * count..(column + 1) * count]);
-            }
+        let rows: usize = parts.iter().map(|part| part.nrows()).sum();
+        let mut first = Vec::with_capacity(cells.len());
+        let mut columns = Vec::new();
+        for cell in cells {
+            first.push(columns.len());
+            let own = self.coarse[*cell].columns.values.ncols();
+            columns.extend(self.first[*cell]..self.first[*cell] + own);
         }
-        state.solved(DMatrix::from_vec(rows, self.columns, values))
+        let solved: Vec<DMatrix<f64>> = columns
+            .par_chunks(512)
+            .map(|some| {
+                let mut values = Vec::with_capacity(rows * some.len());
+                for column in some {
+                    for part in &parts {
+                        let count = part.nrows();
+                        values.extend_from_slice(&part.as_slice()[column * count..(column + 1) * count]);
+                    }
+                }
+                state.solved(DMatrix::from_vec(rows, some.len(), values))
+            })
+            .collect();
+        let values = solved.iter().flat_map(|part| part.iter().copied()).collect();
+        (DMatrix::from_vec(rows, columns.len(), values), first)
+    }
+
+    /// Cells that do much of what a component does.
+    fn alike(&self, own: &Component, most: usize) -> Vec<usize> {
+        const ALIKE: f64 = 0.2;
+        // Its likeliest motion, of unit length, in the directions of its part.
+        self.parts.know(&[own], self.frame);
+        let state = State::of(&[own], &self.parts, self.frame, None);
+        let Some(weights) = state.weights() else { return Vec::new() };
+        let motion = &*own.part * &weights;
+        let length = motion.norm().max(f64::MIN_POSITIVE);
+        let Some(products) = self.products.get(&own.id) else { return Vec::new() };
+        let along: Vec<f64> = products.tr_mul(&weights).iter().map(|value| value / length).collect();
+        let overlap = |cell: usize| {
+            let range = self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
+            (self.coarse[cell].overlap(&along[range]), cell)
+        };
+        let mut all: Vec<(f64, usize)> = (0..self.cells.len()).into_par_iter().map(overlap).filter(|(share, _)| *share > ALIKE).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        all.into_iter().take(most).map(|(_, cell)| cell).collect()
     }
 
     /// The same of a block's columns, from the components that the state has.
@@ -163,7 +210,8 @@ impl<'f, 'a> Table<'f, 'a> {
     }
 
     pub fn state(&self, components: &[&Component], kappa: Option<f64>) -> State {
-        State::of(components, self.frame, kappa)
+        self.parts.know(components, self.frame);
+        State::of(components, &self.parts, self.frame, kappa)
     }
 
     /// The evidence of a cell in all of its shapes beside a state of some components.
@@ -192,18 +240,29 @@ impl<'f, 'a> Table<'f, 'a> {
     /// The odds of every cell beside a state, closely those of the best and of some more. A cell that has a component already has no price for
     /// another one.
     pub fn scan(&self, state: &State, components: &[&Component], most: usize, also: &[usize]) -> Scan {
+        let all: Vec<usize> = (0..self.cells.len()).collect();
+        self.scan_some(&all, state, components, most, also)
+    }
+
+    /// The odds of cells that do much of what a component does, beside a state without it.
+    pub fn scan_alike(&self, own: &Component, state: &State, others: &[&Component], most: usize, also: &[usize]) -> Scan {
+        self.scan_some(&self.alike(own, 60), state, others, most, also)
+    }
+
+    /// The same of some cells.
+    fn scan_some(&self, cells: &[usize], state: &State, components: &[&Component], most: usize, also: &[usize]) -> Scan {
         let prior = |cell: usize| {
             if components.iter().any(|own| own.cell == cell) { 0.0 } else { self.cells[cell].log_prior }
         };
-        let across = self.across(state);
-        let bound = |cell: usize| prior(cell) + state.bound(&self.coarse[cell], &across, self.first[cell]);
-        let bounds: Vec<f64> = (0..self.cells.len()).into_par_iter().map(bound).collect();
-        let coarse = |cell: usize| {
+        let (across, first) = self.across_cells(cells, state);
+        let bound = |k: usize| prior(cells[k]) + state.bound(&self.coarse[cells[k]], &across, first[k]);
+        let bounds: Vec<f64> = (0..cells.len()).into_par_iter().map(bound).collect();
+        let coarse = |k: usize| {
             let mut logs = Vec::new();
-            state.shapes(&self.coarse[cell], &across, self.first[cell], |_, _, found| logs.push(found.log));
-            prior(cell) + log_sum(&logs)
+            state.shapes(&self.coarse[cells[k]], &across, first[k], |_, _, found| logs.push(found.log));
+            prior(cells[k]) + log_sum(&logs)
         };
-        let mut promising: Vec<usize> = (0..self.cells.len()).collect();
+        let mut promising: Vec<usize> = (0..cells.len()).collect();
         promising.sort_by(|a, b| bounds[*b].total_cmp(&bounds[*a]).then(a.cmp(b)));
         let mut log_odds = vec![f64::NEG_INFINITY; self.cells.len()];
         // In turns, until no other cell could come near the best.
@@ -212,7 +271,7 @@ impl<'f, 'a> Table<'f, 'a> {
             if bounds[some[0]] < (best - FAR_BELOW).max(UNLIKELY) {
                 break;
             }
-            let found: Vec<(usize, f64)> = some.par_iter().map(|cell| (*cell, coarse(*cell))).collect();
+            let found: Vec<(usize, f64)> = some.par_iter().map(|k| (cells[*k], coarse(*k))).collect();
             found.into_iter().for_each(|(cell, log)| log_odds[cell] = log);
         }
         let mut order: Vec<usize> = (0..self.cells.len()).filter(|cell| log_odds[*cell].is_finite()).collect();
@@ -226,7 +285,8 @@ impl<'f, 'a> Table<'f, 'a> {
         for (cell, found) in &closely {
             log_odds[*cell] = prior(*cell) + found.log;
         }
-        let mut scan = Scan { log_odds, closely };
+        let order = promising.into_iter().map(|k| cells[k]).collect();
+        let mut scan = Scan { log_odds, closely, order };
         self.refine(&mut scan, state, components, &prior);
         scan
     }
@@ -300,19 +360,21 @@ impl<'f, 'a> Table<'f, 'a> {
         }
     }
 
+    /// A component with other forms, before it has a part in the covariance.
+    fn with_forms(&self, before: &Component, forms: Vec<Form>) -> Component {
+        let (columns, counts) = self.frame.columns(&forms);
+        Component { forms, counts, values: Arc::new(columns.values), square: Arc::new(columns.square), ..before.clone() }
+    }
+
     /// A component of given forms, e.g. of the model before.
     pub fn component_of(&mut self, before: &Component, cell: usize) -> Component {
         self.next += 1;
-        let (columns, counts) = self.frame.columns(&before.forms);
-        let (values, square) = (Arc::new(columns.values), Arc::new(columns.square));
-        Component { cell, counts, values, square, ..before.clone() }.with_part(self.next)
+        Component { cell, ..self.with_forms(before, before.forms.clone()) }.with_part(self.next)
     }
 
     /// ln of the evidence of one shape with its weight beside a state, and its amplitude.
     fn of_component(&self, own: &Component, state: &State, others: &[&Component]) -> Option<(f64, f64)> {
-        let mut group = (*own.group).clone();
-        group.forms.clone_from(&own.forms);
-        let block = Block::of(vec![group], self.frame);
+        let block = Block::of_component(own, self.frame);
         let across = self.across_block(&block, state, others);
         let mut found = None;
         state.shapes(&block, &across, 0, |_, _, own| found = Some((own.log, own.amplitude)));
@@ -335,7 +397,7 @@ impl<'f, 'a> Table<'f, 'a> {
             loop {
                 let near = form.near(self.survey, level);
                 let tried = near.into_iter().filter(|near| !keys.contains(&near.key())).filter_map(|near| {
-                    let other = Component { forms: vec![near.clone()], ..best.clone() };
+                    let other = self.with_forms(&best, vec![near.clone()]);
                     self.of_component(&other, state, others).map(|(log, amplitude)| (log, amplitude, near))
                 });
                 let leaves_whole = |near: &Form| is_whole_order(&form) && !is_whole_order(near);
@@ -357,12 +419,26 @@ impl<'f, 'a> Table<'f, 'a> {
     }
 
     /// Every component anew beside all others: shape and amplitude.
-    pub fn backfit(&mut self, mut components: Vec<Component>, rounds: usize) -> Vec<Component> {
+    pub fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
+        let all = (0..components.len()).collect::<Vec<_>>();
+        self.backfit_some(components, &all, rounds)
+    }
+
+    /// The newest component and those that do in part what it does.
+    fn backfit_newest(&mut self, components: Vec<Component>) -> Vec<Component> {
+        const COUPLED: f64 = 0.01;
+        let Some(newest) = components.last() else { return components };
+        self.parts.know(&components.iter().collect::<Vec<_>>(), self.frame);
+        let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > COUPLED;
+        let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
+        self.backfit_some(components, &some, 1)
+    }
+
+    fn backfit_some(&mut self, mut components: Vec<Component>, some: &[usize], rounds: usize) -> Vec<Component> {
         for _ in 0..rounds {
-            self.know(&components);
             let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
             let mut changed = false;
-            for i in 0..components.len() {
+            for i in some.iter().copied() {
                 let others: Vec<Component> = without(&components, &[i]);
                 let others: Vec<&Component> = others.iter().collect();
                 let state = self.state(&others, Some(kappa));
@@ -400,30 +476,66 @@ impl<'f, 'a> Table<'f, 'a> {
         components
     }
 
-    /// Adds cells while they pay.
+    /// Where the strongest cell is one of loads, every joint that yields to its own: one link that bends may look better than any one joint, and
+    /// worse than all of them. Nothing else.
+    pub fn start(&mut self) -> Vec<Component> {
+        let state = self.state(&[], None);
+        let scan = self.scan(&state, &[], *CLOSELY, &[]);
+        let loads = |form: &Form| form.variables().iter().any(|of| matches!(of, Variable::Load { .. } | Variable::ArmLoad));
+        let by_load = |best: usize| {
+            let found = self.as_found(best, &scan.closely[&best]);
+            scan.log_odds[best] > *JOINS && found.forms.iter().any(loads)
+        };
+        if !scan.best().is_some_and(by_load) {
+            return Vec::new();
+        }
+        let yields: Vec<usize> =
+            (0..self.cells.len()).filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE).collect();
+        let mut components = Vec::new();
+        for cell in yields {
+            if let Some(mut found) = self.closely(cell, &state, &[]) {
+                found.shape = (0, 0);
+                components.push(self.component(cell, &found));
+            }
+        }
+        components = self.backfit(components, 2);
+        self.prune(components)
+    }
+
+    /// Adds cells while they pay. What is smaller than the second order of what this round has found already waits for the next round, which
+    /// is around a model that has that in it.
     pub fn grow(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         self.know(&components);
+        let (mut likely, mut has_grown): (Vec<usize>, bool) = ((0..self.cells.len()).collect(), false);
         while components.len() < *COMPONENTS {
             let now: Vec<&Component> = components.iter().collect();
             let state = self.state(&now, None);
-            let scan = self.scan(&state, &now, *CLOSELY, &[]);
-            let Some(best) = scan.best() else { break };
-            if std::env::var("CALIB_DEBUG").is_ok() {
-                for (k, c) in self.cells.iter().enumerate() { if c.place == crate::effect::Place::Tracker && scan.log_odds[k] > 5.0 { eprintln!("  tr {:.1} {}", scan.log_odds[k], c.key); } }
-                let mut order: Vec<usize> = (0..self.cells.len()).filter(|c| scan.log_odds[*c].is_finite()).collect();
-                order.sort_by(|a, b| scan.log_odds[*b].total_cmp(&scan.log_odds[*a]));
-                eprintln!("kappa {:.3} n {} comps {:?}", state.kappa, state.rows.freedom, components.iter().map(|c| (self.cells[c.cell].key.clone(), (c.amplitude * 1e6) as i64)).collect::<Vec<_>>());
-                for c in order.iter().take(8) { eprintln!("     {:.1} {} {}", scan.log_odds[*c], self.cells[*c].key, scan.closely.contains_key(c)); }
-            }
+            let mut scan = self.scan_some(&likely, &state, &now, *CLOSELY, &[]);
             // A misjudged noise makes everything seem likely.
             let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
+            if likely.len() < self.cells.len() && scan.best().is_none_or(|best| scan.log_odds[best] < price) {
+                scan = self.scan(&state, &now, *CLOSELY, &[]);
+            }
+            // What was unlikely before is asked again when the likely ones are used up.
+            likely = scan.order.iter().copied().take(LIKELY).collect();
+            let Some(best) = scan.best() else { break };
             if scan.log_odds[best] < price {
                 break;
             }
             let found = scan.closely[&best].clone();
+            let new = components.iter().filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
+            let moved: f64 = new.map(|own| own.amplitude.powi(2)).sum();
+            if found.amplitude < *SECOND_ORDER * moved {
+                break;
+            }
             components.push(self.component(best, &found));
-            components = self.backfit(components, 2);
+            components = self.backfit_newest(components);
+            has_grown = true;
         }
+        if !has_grown {
+            return components;
+        }
+        components = self.backfit(components, 2);
         self.prune(components)
     }
 
@@ -479,7 +591,8 @@ impl<'f, 'a> Table<'f, 'a> {
                 let others = without(&components, &[i]);
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
-                let scan = self.scan(&state, &rest, 5, &[own]);
+                let alike = self.alike(&components[i], 24);
+                let scan = self.scan_some(&alike, &state, &rest, 5, &[own]);
                 let Some(best) = scan.best() else { continue };
                 let again = rest.iter().any(|other| other.cell == own);
                 let prior = if again { 0.0 } else { self.cells[own].log_prior };
@@ -522,7 +635,7 @@ impl<'f, 'a> Table<'f, 'a> {
         for id in curves {
             let Some(at) = components.iter().position(|own| own.id == id) else { continue };
             let place = self.cells[components[at].cell].place;
-            let gear = |cell: &Cell| cell.place == place && cell.key.starts_with(crate::effect::names::GEAR_CYCLIC);
+            let gear = |cell: &Cell| cell.place == place && cell.key.starts_with(names::GEAR_CYCLIC);
             let Some(gear) = self.cells.iter().position(gear) else { continue };
             let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
             let before = self.total(&components, kappa);

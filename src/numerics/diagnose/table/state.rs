@@ -13,8 +13,9 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, RwLock};
 
 /// A group of shapes with its columns.
 pub(super) struct SeenGroup {
@@ -51,6 +52,35 @@ impl Block {
             SeenGroup { group, range, counts, gram, gradient }
         };
         Self { groups: groups.into_iter().map(seen).collect(), columns }
+    }
+}
+
+impl Block {
+    /// The shape of a component alone.
+    pub fn of_component(own: &Component, frame: &Frame) -> Self {
+        let values = (*own.values).clone();
+        let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
+        let range = 0..values.ncols();
+        let group = SeenGroup { group: (*own.group).clone(), range, counts: own.counts.clone(), gram, gradient };
+        Self { groups: vec![group], columns: Columns { values, square: (*own.square).clone() } }
+    }
+
+    /// The largest share of a motion that the columns of a group can make, by their products with it; of unit length.
+    pub fn overlap(&self, along: &[f64]) -> f64 {
+        let mut most = 0.0;
+        for group in &self.groups {
+            let along = DVector::from_column_slice(&along[group.range.clone()]);
+            let share = match along.len() {
+                1 => along[0] * along[0] / group.gram[(0, 0)].max(f64::MIN_POSITIVE),
+                count => {
+                    let least = 1e-6 * group.gram.trace().max(f64::MIN_POSITIVE);
+                    let factor = Cholesky::new(&group.gram + DMatrix::identity(count, count) * least);
+                    factor.map_or(0.0, |factor| along.dot(&factor.solve(&along)))
+                }
+            };
+            most = f64::max(most, share);
+        }
+        most
     }
 }
 
@@ -106,6 +136,75 @@ impl Component {
     }
 }
 
+/// Products of the parts of components with each other and with the residual, each computed once.
+#[derive(Default)]
+pub(super) struct PartProducts(RwLock<PartCache>);
+
+#[derive(Default)]
+struct PartCache {
+    pairs: BTreeMap<(u64, u64), Arc<DMatrix<f64>>>,
+    along: BTreeMap<u64, Arc<DVector<f64>>>,
+}
+
+impl PartProducts {
+    /// Computes what is missing for some components, and forgets what is too much.
+    pub fn know(&self, components: &[&Component], frame: &Frame) {
+        let Ok(mut cache) = self.0.write() else { return };
+        if cache.pairs.len() > 20_000 {
+            *cache = PartCache::default();
+        }
+        for (i, own) in components.iter().enumerate() {
+            if !cache.along.contains_key(&own.id) {
+                cache.along.insert(own.id, Arc::new(frame.along(&own.part)));
+            }
+            for other in &components[..=i] {
+                let key = (own.id.max(other.id), own.id.min(other.id));
+                if !cache.pairs.contains_key(&key) {
+                    let [later, earlier] = if own.id >= other.id { [own, other] } else { [other, own] };
+                    cache.pairs.insert(key, Arc::new(product(view(&later.part), view(&earlier.part))));
+                }
+            }
+        }
+    }
+
+    /// The Gram matrix of components, and their products with the residual.
+    fn of(&self, components: &[&Component]) -> (DMatrix<f64>, DVector<f64>) {
+        let count: usize = components.iter().map(|own| own.part.ncols()).sum();
+        let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let Ok(cache) = self.0.read() else { return (gram, along) };
+        let mut down = 0;
+        for (i, own) in components.iter().enumerate() {
+            let rows = own.part.ncols();
+            if let Some(known) = cache.along.get(&own.id) {
+                along.rows_mut(down, rows).copy_from(known);
+            }
+            let mut across = 0;
+            for other in &components[..=i] {
+                let columns = other.part.ncols();
+                let key = (own.id.max(other.id), own.id.min(other.id));
+                if let Some(known) = cache.pairs.get(&key) {
+                    let block = if own.id >= other.id { (**known).clone() } else { known.transpose() };
+                    gram.view_mut((across, down), (columns, rows)).copy_from(&block.transpose());
+                    gram.view_mut((down, across), (rows, columns)).copy_from(&block);
+                }
+                across += columns;
+            }
+            down += rows;
+        }
+        (gram, along)
+    }
+
+    /// How much two components do the same, 0 to 1.
+    pub fn overlap(&self, a: &Component, b: &Component) -> f64 {
+        let Ok(cache) = self.0.read() else { return 1.0 };
+        let square = |a: u64, b: u64| cache.pairs.get(&(a.max(b), a.min(b))).map(|known| known.norm_squared());
+        match (square(a.id, b.id), square(a.id, a.id), square(b.id, b.id)) {
+            (Some(both), Some(own), Some(other)) => both / (own * other).sqrt().max(f64::MIN_POSITIVE),
+            _ => 1.0,
+        }
+    }
+}
+
 /// Some components in the covariance.
 pub(super) struct State {
     /// Standard deviation of the noise over what is stated.
@@ -122,10 +221,9 @@ pub(super) struct State {
 
 impl State {
     /// Components with the noise that fits them, or with a stated one.
-    pub fn of(components: &[&Component], frame: &Frame, kappa: Option<f64>) -> Self {
-        let z = side_by_side(components, frame.residual_rows());
-        let count = z.ncols();
-        let (gram, along) = (product(view(&z), view(&z)), frame.along(&z));
+    pub fn of(components: &[&Component], products: &PartProducts, frame: &Frame, kappa: Option<f64>) -> Self {
+        let (gram, along) = products.of(components);
+        let count = along.len();
         let rows = frame.rows();
         let solved = |square: f64| {
             let matrix = Mat::from_fn(count, count, |i, j| gram[(i, j)] + if i == j { square } else { 0.0 });
@@ -172,6 +270,18 @@ impl State {
             scaled.map(|((root, sigma), along)| sigma * root * along).collect()
         };
         components.iter().map(of).collect()
+    }
+
+    /// The likeliest weights of its columns; none where it has none.
+    pub fn weights(&self) -> Option<DVector<f64>> {
+        let mut weights = self.along.clone();
+        let count = weights.len();
+        if count == 0 {
+            return None;
+        }
+        let out = MatMut::from_column_major_slice_mut(weights.as_mut_slice(), count, 1);
+        solve_upper_triangular_in_place(self.lower.transpose(), out, Par::Seq);
+        Some(weights)
     }
 
     /// Half of ln of the determinant of the covariance over that of the noise.
