@@ -42,11 +42,11 @@ criteria! {
     /// What a motion leaves of the second order: this times its square.
     SECOND_ORDER: f64 = 0.5, "1/m", "physics: half of the square of a motion over the reach of an arm, a metre", "";
     /// Components of a model at most.
-    COMPONENTS: usize = 28, "components", "judgement: bounds time", "";
+    COMPONENTS: usize = 26, "components", "judgement: bounds time", "";
     /// Cells of which every shape is asked, after all were asked coarsely.
     CLOSELY: usize = 12, "cells", "judgement: bounds time", "";
     /// Rounds of fitting the whole model and searching around it.
-    ROUNDS: usize = 6, "rounds", "count: two suffice as a rule, a further one for each size of effects", "";
+    ROUNDS: usize = 4, "rounds", "count: two suffice as a rule, a further one for each size of effects", "";
     /// Correlation lengths of curves, shares of the range of their variable.
     LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.015], "share of the range", "count: threefold, from the whole range to what forty cosines resolve", "";
     /// Share of a curve in a line that is not quite straight, rms over rms.

@@ -209,7 +209,7 @@ fn with_all_steps(groups: &[ShapeGroup], survey: &Survey) -> Vec<ShapeGroup> {
 
 /// A cause's line and a curve over the same variable, as one physics: a line, or one that is not quite straight.
 pub(super) fn not_quite_straight(line: Form, motion: Motion, of: Variable, values: &[f64], log_weight: f64) -> Option<ShapeGroup> {
-    const COUNT: usize = 24;
+    const COUNT: usize = 12;
     if has_few(values) {
         return None;
     }
@@ -217,12 +217,12 @@ pub(super) fn not_quite_straight(line: Form, motion: Motion, of: Variable, value
     let curve = Term::new(&Unknown, motion, Law::new(of, Basis::Cosines { low, high, count: COUNT }));
     let fields = fields(motion);
     let mut shapes = Vec::new();
-    for curve in matern(COUNT, 4, motion) {
+    for curve in matern(COUNT, 3, motion) {
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
             let shares = line.chain(curve.iter().map(|own| own * share * share / all)).collect();
-            shapes.push(Shape { shares, log_weight: log_weight - 8.0_f64.ln(), is_bent: true });
+            shapes.push(Shape { shares, log_weight: log_weight - 6.0_f64.ln(), is_bent: true });
         }
     }
     Some(ShapeGroup { forms: vec![line, curve.into()], shapes, positive: false, largest: f64::INFINITY })

@@ -80,6 +80,11 @@ impl<'a> Frame<'a> {
         Rows { freedom: (counted - self.base.ncols() as f64).max(1.0), square }
     }
 
+    /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
+    pub fn least_noise(&self) -> f64 {
+        if self.view.problem.of_readings().len() < self.residual.len() { 1.0 } else { 0.09 }
+    }
+
     pub fn residual(&self) -> &[f64] {
         &self.residual
     }

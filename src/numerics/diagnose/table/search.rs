@@ -5,7 +5,7 @@ use super::evidence::{AMPLITUDES, log_sum};
 use super::frame::{Frame, product, view};
 use super::state::{Block, Component, PartProducts, State};
 use super::{generated, listed};
-use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SECOND_ORDER, SWAPS};
+use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SECOND_ORDER, SWAPS, TRACE};
 use crate::effect::{Basis, DeclaredCause, Form, Survey, Variable, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -673,7 +673,8 @@ impl<'f, 'a> Table<'f, 'a> {
         let products: Vec<_> = products.collect();
         let stays = |shown: &&FreeShape| products.iter().any(|(motion, of)| *motion == shown.motion && *of == shown.of);
         let mut out: Vec<FreeShape> = self.multiplied.iter().filter(stays).copied().collect();
-        for own in components {
+        let most = components.iter().map(|own| own.amplitude).fold(0.0, f64::max);
+        for own in components.iter().filter(|own| own.amplitude > 2.0 * *TRACE * most) {
             let free = match &self.cells[own.cell].shapes {
                 Shapes::Free(free) if !matches!(free.over, super::cell::Over::Product(_)) => Some(*free),
                 Shapes::Free(_) => None,

@@ -237,7 +237,7 @@ impl State {
         if kappa.is_none() {
             for _ in 0..30 {
                 let left = (rows.square - solved_along.norm_squared()).max(0.0);
-                let next = ((*NU + left) / (*NU + rows.freedom)).max(0.09);
+                let next = ((*NU + left) / (*NU + rows.freedom)).max(frame.least_noise());
                 let done = (next.sqrt() - square.sqrt()).abs() < 1e-4 * square.sqrt();
                 square = next;
                 (lower, solved_along) = solved(square);
