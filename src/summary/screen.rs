@@ -1,0 +1,148 @@
+//! The lines of a result, as `run` and `diagnose` print them: 100 columns at most.
+
+use super::short_finding::ShortFinding;
+use super::{LABEL, folded, labelled};
+use crate::error::counted;
+use crate::robot::NoiseBasis;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+/// Columns of a result at most.
+const WIDTH: usize = 100;
+/// Findings that are told of many; one more is told rather than counted.
+const FOUND: usize = 5;
+/// Below this (mm) a mean error has four decimals.
+const SMALL: f64 = 0.01;
+
+/// Columns that a result has, on a terminal of this width or elsewhere.
+pub(super) fn width(terminal: Option<usize>) -> usize {
+    terminal.map_or(WIDTH, |columns| columns.min(WIDTH))
+}
+
+/// What was measured: the robot, its rows, the noise.
+pub(super) fn measured(robot: Option<&str>, rows: &str, noise: Option<&str>) -> String {
+    let all: Vec<&str> = [Some(rows), noise].into_iter().flatten().collect();
+    let rows = all.join("; ");
+    labelled("robot", &robot.map_or_else(|| rows.clone(), |robot| format!("{}: {rows}", cut(robot, WIDTH / 3))))
+}
+
+/// Mean and largest error of a step (mm), with the decimals that suit the smaller of all means.
+pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, of: &str) -> String {
+    let decimals = if least < SMALL { 4 } else { 3 };
+    labelled(label, &format!("{mean:>8.decimals$} mm mean {largest:>8.decimals$} mm largest   {of}"))
+}
+
+/// What the noise is and rests on.
+pub(super) fn noise(size: &str, basis: Option<&str>) -> String {
+    match basis.and_then(NoiseBasis::parse) {
+        Some(NoiseBasis::Repeats) => format!("repeats show {size}"),
+        Some(NoiseBasis::Inferred) => "noise not known".into(),
+        Some(NoiseBasis::Instrument) | None => format!("instrument {size}"),
+    }
+}
+
+/// How many findings did not stand; nothing where all did.
+pub(super) fn withdrawn(count: usize) -> String {
+    let was = if count == 1 { "was" } else { "were" };
+    if count == 0 { String::new() } else { labelled("withdrawn", &format!("{} {was} not confirmed", counted(count, "finding"))) }
+}
+
+/// One thing to do next.
+pub struct NextStep {
+    /// In a few words.
+    pub what: String,
+    /// What to type for it.
+    pub command: Option<String>,
+}
+
+impl NextStep {
+    /// To correct one's targets by the model of a run.
+    pub fn correct(run: &str, store: &str) -> Self {
+        Self { what: "correct your targets".into(), command: Some(format!("calib compensate {run} targets.csv{store}")) }
+    }
+
+    /// Its lines.
+    pub fn text(&self, width: usize) -> String {
+        match &self.command {
+            Some(command) if LABEL + self.what.width() + command.width() + 2 <= width => {
+                labelled("next", &format!("{}: {command}", self.what))
+            }
+            Some(command) => sentence("next", &self.what, width) + &labelled("", command),
+            None => sentence("next", &self.what, width),
+        }
+    }
+}
+
+/// A sentence of any length under its label.
+pub(super) fn sentence(label: &str, text: &str, width: usize) -> String {
+    folded(&labelled(label, text), width)
+}
+
+/// The largest findings, two a line where there is room, and how many are smaller.
+pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
+    let size = |finding: &ShortFinding| finding.size.as_ref().map_or(0.0, |(size, _)| *size);
+    findings.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    let told = if findings.len() > FOUND + 1 { FOUND } else { findings.len() };
+    let smaller = findings.len() - told;
+    let sizes: Vec<&str> =
+        findings[..told].iter().map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str())).collect();
+    let right = sizes.iter().map(|size| size.width()).max().unwrap_or(0);
+    let room = width.saturating_sub(LABEL);
+    let half = room / 2;
+    let mut cells: Vec<String> =
+        sizes.iter().zip(&findings).map(|(size, one)| cut(&format!("{size:>right$}  {}", one.what), room)).collect();
+    if smaller > 0 {
+        cells.push(format!("{:right$}  and {smaller} smaller", ""));
+    }
+    let paired = width >= WIDTH && cells.iter().all(|cell| cell.width() < half);
+    let each = if paired { 2 } else { 1 };
+    let line = |(number, cells): (usize, &[String])| {
+        let text = match cells {
+            [left, right] => format!("{left}{}{right}", " ".repeat(half - left.width())),
+            others => others.concat(),
+        };
+        labelled(if number == 0 { "found" } else { "" }, &text)
+    };
+    cells.chunks(each).enumerate().map(line).collect()
+}
+
+/// A finding with its number under its rank; what it might be instead stands beside it where there is room, else below.
+pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) -> String {
+    let room = width.saturating_sub(LABEL);
+    let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
+    let figures: Vec<&str> = finding.number.iter().chain(&size).map(String::as_str).collect();
+    let told = if figures.is_empty() { finding.what.clone() } else { format!("{}: {}", finding.what, figures.join(", ")) };
+    let told = cut(&told, room);
+    let label = format!("{rank:>3}.");
+    match &finding.instead {
+        Some(instead) if told.width() + instead.width() + 2 <= room => labelled(&label, &format!("{told}; {instead}")),
+        Some(instead) => labelled(&label, &told) + &labelled("", &cut(instead, room)),
+        None => labelled(&label, &told),
+    }
+}
+
+/// Names in a line, as many as there is room for.
+pub(super) fn names(label: &str, all: &[String], width: usize) -> String {
+    let room = width.saturating_sub(LABEL);
+    let shown = |count: usize| {
+        let rest = all.len() - count;
+        let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+        all[..count].join(", ") + &more
+    };
+    let fits = (1..=all.len()).rev().map(shown).find(|text| text.width() <= room);
+    fits.or_else(|| all.first().cloned()).map_or_else(String::new, |text| labelled(label, &cut(&text, room)))
+}
+
+/// A text of this width at most, `…` for what is cut off.
+pub(super) fn cut(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.into();
+    }
+    let mut out = String::new();
+    for c in text.chars() {
+        if out.width() + c.width().unwrap_or(0) + 1 > width {
+            break;
+        }
+        out.push(c);
+    }
+    out + "…"
+}
