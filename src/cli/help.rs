@@ -23,9 +23,8 @@ pub(super) fn grouped(command: Command) -> Command {
     };
     let header = clap::builder::Styles::styled();
     let header = header.get_header();
-    let group = |(what, verbs): &(&str, &[&str])| {
-        format!("{header}{what}:{header:#}\n{}\n", verbs.iter().map(line).collect::<String>())
-    };
+    let group =
+        |(what, verbs): &(&str, &[&str])| format!("{header}{what}:{header:#}\n{}\n", verbs.iter().map(line).collect::<String>());
     let groups: String = GROUPS.iter().map(group).collect();
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}`calib VERB --help` says more of a verb.\n\n\

@@ -6,7 +6,19 @@ use anstyle::{AnsiColor, Style};
 /// Labels of lines that say what is to be seen to, and all others.
 const ALARMS: [&str; 4] = ["warning", "doubt", "rejected", "withdrawn"];
 const LABELS: [&str; 14] = [
-    "robot", "before", "after", "carried", "found", "verdict", "next", "report", "limits", "not seen", "set aside", "done", "error",
+    "robot",
+    "before",
+    "after",
+    "carried",
+    "found",
+    "verdict",
+    "next",
+    "report",
+    "limits",
+    "not seen",
+    "set aside",
+    "done",
+    "error",
     "more",
 ];
 

@@ -21,7 +21,7 @@ impl Diagnosed {
     /// What the stage of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         if stage.uses == DiagnoseTorques::NAME {
-            return TorqueSummary::read(stage, store).map(|told| Self::Torques(Box::new(told)));
+            return TorqueSummary::read(run, stage, store).map(|told| Self::Torques(Box::new(told)));
         }
         DiagnosisSummary::read(run, stage, store).map(|told| Self::Positions(Box::new(told)))
     }
@@ -63,7 +63,7 @@ impl Diagnosed {
         let width = screen::width(columns);
         match self {
             Self::Positions(told) => told.short(store, width),
-            Self::Torques(told) => told.short(width),
+            Self::Torques(told) => told.short(store, width),
         }
     }
 
@@ -97,7 +97,7 @@ impl Diagnosed {
     pub(super) fn next_step(&self, store: &str) -> Option<NextStep> {
         match self {
             Self::Positions(told) => told.next_step(store),
-            Self::Torques(_) => None,
+            Self::Torques(_) => Some(TorqueSummary::next_step("HEAD", store)),
         }
     }
 }

@@ -35,7 +35,9 @@ pub fn in_short(
     let diagnosed = diagnosed.map(|stage| Diagnosed::read(&outcome.manifest.run_id, stage, store)).transpose()?;
     if let Some(wrong) = wrong {
         let verdict = diagnosed.map_or_else(|| "wrong set-up".into(), |told| told.verdict());
-        return Ok(Some(labelled("verdict", &verdict) + &screen::sentence("", wrong, width)));
+        return Ok(Some(
+            labelled("verdict", &verdict) + &screen::sentence("", wrong.trim_start_matches("the set-up is wrong: "), width),
+        ));
     }
     // What a model does elsewhere is what a carried one is asked for; its sets may bear the names of those that it was fitted to.
     let carried = ran(Transfer::NAME).filter(|stage| rows.iter().any(|row| row.step == stage.id));

@@ -3,7 +3,6 @@
 use super::short_finding::ShortFinding;
 use super::{LABEL, folded, labelled};
 use crate::error::counted;
-use crate::robot::NoiseBasis;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Columns of a result at most.
@@ -33,11 +32,22 @@ pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, of: &st
 
 /// What the noise is and rests on.
 pub(super) fn noise(size: &str, basis: Option<&str>) -> String {
-    match basis.and_then(NoiseBasis::parse) {
-        Some(NoiseBasis::Repeats) => format!("repeats show {size}"),
-        Some(NoiseBasis::Inferred) => "noise not known".into(),
-        Some(NoiseBasis::Instrument) | None => format!("instrument {size}"),
+    match basis {
+        Some("repeats") => format!("repeats show {size}"),
+        Some("inferred") => "noise not known".into(),
+        Some(_) | None => format!("instrument {size}"),
     }
+}
+
+/// What the errors after a diagnosis are of.
+pub(super) fn with_findings(count: usize) -> &'static str {
+    if count == 0 { "nothing found" } else { "with the findings" }
+}
+
+/// What the data cannot show, by the names alone that begin its sentences.
+pub(super) fn not_seen(sentences: &[&str], width: usize) -> String {
+    let name = |line: &&str| line.split_once(": ").map_or(*line, |(what, _)| what).replace('_', " ");
+    names("not seen", &sentences.iter().map(name).collect::<Vec<_>>(), width)
 }
 
 /// How many findings did not stand; nothing where all did.
@@ -83,8 +93,7 @@ pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
     findings.sort_by(|a, b| size(b).total_cmp(&size(a)));
     let told = if findings.len() > FOUND + 1 { FOUND } else { findings.len() };
     let smaller = findings.len() - told;
-    let sizes: Vec<&str> =
-        findings[..told].iter().map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str())).collect();
+    let sizes: Vec<&str> = findings[..told].iter().map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str())).collect();
     let right = sizes.iter().map(|size| size.width()).max().unwrap_or(0);
     let room = width.saturating_sub(LABEL);
     let half = room / 2;
@@ -145,4 +154,46 @@ pub(super) fn cut(text: &str, width: usize) -> String {
         out.push(c);
     }
     out + "…"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding(mm: f64, what: &str) -> ShortFinding {
+        let size = Some((mm, format!("{mm:.2} mm")));
+        ShortFinding { size, what: what.into(), number: Some("14.8 +- 0.4 arcsec".into()), instead: None }
+    }
+
+    fn several(count: usize) -> Vec<ShortFinding> {
+        (1..=count).map(|k| finding(k as f64, &format!("joint {k} yields under load"))).collect()
+    }
+
+    #[test]
+    fn the_five_largest_findings_stand_two_a_line_and_the_others_are_counted() {
+        assert_eq!(
+            found(several(17), 100),
+            "found     17.00 mm  joint 17 yields under load         16.00 mm  joint 16 yields under load\n          \
+             15.00 mm  joint 15 yields under load         14.00 mm  joint 14 yields under load\n          \
+             13.00 mm  joint 13 yields under load                   and 12 smaller\n"
+        );
+        assert_eq!(found(several(6), 100).lines().count(), 3);
+        let narrow = found(several(17), 80);
+        assert!(narrow.lines().count() == 6 && narrow.lines().all(|line| line.width() <= 80), "{narrow}");
+        assert_eq!(found(Vec::new(), 100), "");
+    }
+
+    #[test]
+    fn no_line_is_wider_than_the_result() {
+        let long = ShortFinding {
+            instead: Some("or: joint 4 errs with angle and direction (31 %)".into()),
+            ..finding(0.1, &"x".repeat(70))
+        };
+        for width in [60, 80, 100] {
+            let text = ranked(3, &long, " at the tool", width) + &found(vec![finding(0.1, &"x".repeat(120))], width);
+            let text = text + &names("not seen", &vec!["temperature".to_string(); 20], width);
+            assert!(text.lines().all(|line| line.width() <= width), "{text}");
+            assert!(text.contains("or: joint 4") && text.contains(" more\n"), "{text}");
+        }
+    }
 }

@@ -1,10 +1,10 @@
 //! A diagnosis of torques from its tables, as text and as JSON.
 
-use crate::effect::figure;
-use super::screen;
+use super::screen::{self, NextStep};
 use super::short_finding::{FindingNumber, FoundCause, NamedRival, ShortFinding};
 use super::{labelled, robot_of};
 use crate::diagnose::VerdictKind;
+use crate::effect::figure;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::store::Store;
@@ -25,11 +25,12 @@ pub struct TorqueSummary {
     contacts: Vec<ContactRow>,
     /// Its name.
     robot: Option<String>,
+    run: String,
 }
 
 impl TorqueSummary {
     /// What a stage `diagnose_torques` of a run wrote. Fails where a table has left the store.
-    pub fn read(stage: &StageReport, store: &Store) -> Result<Self> {
+    pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<T> {
             let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
             let own = own.ok_or_else(|| Error::Bug(format!("a diagnosis of torques without its table {}", T::KIND)))?;
@@ -46,6 +47,7 @@ impl TorqueSummary {
             joints: table::<JointTorques>(stage, store)?.0,
             contacts: table::<Contacts>(stage, store)?.0,
             robot: robot_of(stage, store)?,
+            run: run.into(),
         })
     }
 
@@ -76,20 +78,15 @@ impl TorqueSummary {
 
     fn cause<'a>(&'a self, finding: &'a TorqueFindingRow) -> FoundCause<'a> {
         let numbers = self.numbers.iter().filter(|number| number.rank == finding.rank);
-        let rival = |rival: &'a TorqueRivalRow| NamedRival {
-            effect: &rival.effect,
-            place: &rival.place,
-            probability: rival.probability,
-        };
+        let rival =
+            |rival: &'a TorqueRivalRow| NamedRival { effect: &rival.effect, place: &rival.place, probability: rival.probability };
         let size = Some(finding.effect_rms_nm).filter(|nm| *nm > 0.0);
         FoundCause {
             effect: &finding.effect,
             place: &finding.place,
             statement: &finding.statement,
             forms: "",
-            numbers: numbers
-                .map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma })
-                .collect(),
+            numbers: numbers.map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma }).collect(),
             probability: Some(finding.probability),
             rivals: self.rivals_of(finding.rank).into_iter().map(rival).collect(),
             none: finding.none_probability,
@@ -106,7 +103,8 @@ impl TorqueSummary {
         let line = |label: &str, share: f64, what: &str| {
             labelled(label, &format!("{:>8.2} % rms of the torques, mean over joints   {what}", 100.0 * share))
         };
-        rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}")) + &line("after", v.after_nrmse, "with the findings")
+        rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}"))
+            + &line("after", v.after_nrmse, screen::with_findings(self.findings.len()))
     }
 
     fn rivals_of(&self, rank: i64) -> Vec<&TorqueRivalRow> {
@@ -193,15 +191,21 @@ impl TorqueSummary {
         )
     }
 
+    /// Torques to be fed forward by the model of a run.
+    pub(super) fn next_step(run: &str, store: &str) -> NextStep {
+        let command = format!("calib compensate {run} motion.csv --torque{store}");
+        NextStep { what: "feed torques forward".into(), command: Some(command) }
+    }
+
     /// What `calib diagnose` prints unless all is asked for.
-    pub fn short(&self, width: usize) -> String {
+    pub fn short(&self, store: &str, width: usize) -> String {
         let mut text = self.head() + &labelled("verdict", &self.verdict());
         for (finding, row) in self.found().iter().zip(&self.findings) {
             text.push_str(&screen::ranked(row.rank, finding, " rms", width));
         }
         text.push_str(&screen::withdrawn(self.said(VerdictTopic::Withdrawn).len()));
-        let unseen = self.said(VerdictTopic::NotObservable);
-        text.push_str(&screen::names("not seen", &unseen.into_iter().map(String::from).collect::<Vec<_>>(), width));
+        text.push_str(&screen::not_seen(&self.said(VerdictTopic::NotObservable), width));
+        text.push_str(&Self::next_step(&self.run, store).text(width));
         text + &labelled("more", "--details prints numbers, joints, noise and what was decided from the recording")
     }
 

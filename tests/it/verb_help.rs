@@ -75,7 +75,14 @@ fn every_setting_that_a_help_shows_is_one_of_a_shipped_pipeline() {
 #[test]
 fn the_help_has_every_verb_in_a_group_within_a_hundred_columns() {
     let text = help(&[]);
-    for group in ["Calibrate a robot:", "Look at what was computed:", "Plan a measurement:", "Many robots:", "Keep the store:", "Laboratory:"] {
+    for group in [
+        "Calibrate a robot:",
+        "Look at what was computed:",
+        "Plan a measurement:",
+        "Many robots:",
+        "Keep the store:",
+        "Laboratory:",
+    ] {
         assert!(text.lines().any(|line| line == group), "{group} in\n{text}");
     }
     let wide: Vec<&str> = text.lines().filter(|line| line.starts_with("  ") && line.len() > 100).collect();

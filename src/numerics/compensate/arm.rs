@@ -127,6 +127,8 @@ impl IdentifiedArm {
 pub(super) struct BeyondFitted {
     /// Parameters of its form, in the stack.
     pub parameters: Range<usize>,
+    /// What it is a function of.
+    pub variable: Variable,
     /// By how much, as a share of the fitted range, at most 1.
     pub share: f64,
     /// What the form does to the point there, m, tracker frame.
@@ -184,13 +186,13 @@ impl Reach<'_> {
         let beyond = stack.beyond(robot, &self.data, &self.scratch);
         let mut without = x.clone();
         let mut out = Vec::with_capacity(beyond.len());
-        for (parameters, _, share) in beyond {
+        for (parameters, variable, share) in beyond {
             without[parameters.clone()].fill(0.0);
             let displacement = point - stack.point(robot, &self.data, 0, &without, &mut self.scratch);
             without[parameters.clone()].copy_from_slice(&x[parameters.clone()]);
             // What belonged to the measurement moves no arm.
             if displacement.norm() > 0.0 {
-                out.push(BeyondFitted { parameters, share, displacement });
+                out.push(BeyondFitted { parameters, variable, share, displacement });
             }
         }
         out

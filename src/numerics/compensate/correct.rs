@@ -297,6 +297,7 @@ impl<'a> Corrector<'a> {
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             remarks.extend(certainty.iter().filter_map(Remark::of_certainty));
+            remarks.extend(certainty.iter().flat_map(Remark::beyond));
             let open = Some(&self.by_what_is_not_stated).filter(|findings| !findings.is_empty());
             remarks.extend(open.cloned().map(Remark::NotStated));
             let share = reach.share();
@@ -355,7 +356,7 @@ impl CorrectionTotals {
         self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
         self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..)));
-        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
+        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
     }
 }
 

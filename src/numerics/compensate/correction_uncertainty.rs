@@ -3,7 +3,6 @@
 use super::arm::{BeyondFitted, IdentifiedArm, Reach};
 use super::uncertainty::Uncertainty;
 use crate::estimate::choose::median;
-use crate::observation::noise;
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 
@@ -29,6 +28,8 @@ pub struct CorrectionUncertainty {
     pub u95: f64,
     /// The effect and place that most of it comes from, where one stands out.
     pub finding: Option<String>,
+    /// Findings that are used beyond what was fitted and may be off there by more than the instrument leaves open, and over what.
+    pub beyond: Vec<(String, String)>,
     /// m, 95 %: what is usual at the recorded poses; 0 where they are not known.
     pub usual: f64,
     /// m: length of one standard deviation of the instrument at the recorded poses; 0 where they are not known.
@@ -61,7 +62,7 @@ impl Uncertainty {
     /// Length (m) of one standard deviation of the instrument, rms over the rows of a recording.
     pub(super) fn instrument(data: &Measurements) -> f64 {
         let rows = data.rows();
-        let squares: f64 = (0..rows).map(|row| noise(data, row).powi(2)).filter(|square| square.is_finite()).sum();
+        let squares: f64 = (0..rows).map(|row| data.noise(row).powi(2)).filter(|square| square.is_finite()).sum();
         (squares / rows.max(1) as f64).sqrt()
     }
 
@@ -73,6 +74,8 @@ impl Uncertainty {
         let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
         let jacobian = self.along(reach, q, &along);
         let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
+        let seen = |one: &&BeyondFitted| COVERAGE * by_range(one).sqrt() > SEEN * self.instrument;
+        let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
         if u95 > DOUBTFUL * size {
@@ -81,7 +84,14 @@ impl Uncertainty {
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
         }
-        CorrectionUncertainty { correction: size, u95, finding, usual: self.usual, instrument: self.instrument }
+        CorrectionUncertainty {
+            correction: size,
+            u95,
+            finding,
+            beyond: beyond.iter().filter(seen).map(named).collect(),
+            usual: self.usual,
+            instrument: self.instrument,
+        }
     }
 }
 
@@ -95,6 +105,7 @@ mod tests {
             correction: correction * 1e-6,
             u95: u95 * 1e-6,
             finding: None,
+            beyond: Vec::new(),
             usual: 400e-6,
             instrument: 18e-6,
         };

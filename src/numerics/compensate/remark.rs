@@ -19,6 +19,8 @@ pub enum Remark {
     BeyondMeasured(Unmeasured),
     /// Correction and its uncertainty (m, 95 %), and the finding that most of it comes from.
     Uncertain(f64, f64, Option<String>),
+    /// A finding that is used beyond what was fitted, and over what.
+    BeyondFitted(String, String),
     /// Findings that depend on what no target states.
     NotStated(Vec<String>),
     /// The share of the learned correction that applies.
@@ -30,10 +32,15 @@ pub enum Remark {
 }
 
 impl Remark {
-    /// What is to be said of how certain a correction is.
+    /// That a correction is doubtful, where it is.
     pub(super) fn of_certainty(certainty: &CorrectionUncertainty) -> Option<Self> {
         let uncertain = || Self::Uncertain(certainty.correction, certainty.u95, certainty.finding.clone());
         certainty.is_doubtful().then(uncertain)
+    }
+
+    /// Which findings a target uses beyond what was fitted.
+    pub(super) fn beyond(certainty: &CorrectionUncertainty) -> impl Iterator<Item = Self> {
+        certainty.beyond.iter().map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()))
     }
 }
 
@@ -50,6 +57,7 @@ impl fmt::Display for Remark {
                 write!(f, "the correction of {:.3} mm is uncertain by {:.3} mm", correction * 1e3, u95 * 1e3)?;
                 finding.as_ref().map_or(Ok(()), |finding| write!(f, ", most of it by {finding}"))
             }
+            Self::BeyondFitted(finding, variable) => write!(f, "{finding} beyond the {variable} that was fitted"),
             Self::NotStated(findings) => {
                 write!(f, "{} without what no target states (moves before it, other circumstances)", findings.join(", "))
             }

@@ -157,8 +157,7 @@ fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftove
     let of = |(joint, course): (usize, &Vec<f64>)| {
         let noise = JointNoise::of(course, &runs, 0.0);
         let lasting = noise.autocorrelation();
-        let signature =
-            (lasting > LASTING).then(|| format!("correlated over {lasting:.0} rows: not white noise"));
+        let signature = (lasting > LASTING).then(|| format!("correlated over {lasting:.0} rows: not white noise"));
         TorqueLeftover { rms: noise.sigma, over_noise: noise.sigma / problem.noise[joint].sigma, signature }
     };
     residual.iter().enumerate().map(of).collect()

@@ -3,16 +3,12 @@
 use super::DiagnosisSummary;
 use crate::diagnose::VerdictKind;
 use crate::effect::names;
-use crate::robot::NoiseBasis;
 use crate::summary::estimate::{angle, length};
-use crate::summary::screen::{self, NextStep};
-use crate::summary::short_finding::{FindingNumber, FoundCause, NamedRival, ShortFinding};
 use crate::summary::labelled;
-use crate::table::{FindingRow, RivalRow, VerdictTopic, is_separable_by_poses};
+use crate::summary::screen::{self, NextStep};
+use crate::summary::short_finding::{FindingNumber, FoundCause, NamedRival, ShortFinding, words};
+use crate::table::{FindingRow, RivalRow, VerdictTopic};
 use crate::units::Unit;
-
-/// Held-out points that are off by so many times what is left of fitted ones contradict them.
-const NOT_CARRIED: f64 = 1.5;
 
 impl DiagnosisSummary {
     /// The verdict in at most twelve words.
@@ -21,23 +17,22 @@ impl DiagnosisSummary {
         let size = |mm: Option<f64>, rad: Option<f64>| mm.map(length).or_else(|| rad.map(angle)).unwrap_or_default();
         let left = size(v.leftover_rms_mm, v.leftover_rms_rad);
         let noise = size(v.noise_floor_mm, v.noise_floor_rad);
-        let noise = match v.noise_basis.as_deref().and_then(NoiseBasis::parse) {
-            Some(NoiseBasis::Repeats) => format!("repeats show {noise}"),
-            Some(NoiseBasis::Instrument) => format!("the noise is {noise}"),
-            Some(NoiseBasis::Inferred) | None => "the noise is not known".into(),
+        let noise = match v.noise_basis.as_deref() {
+            Some("repeats") => format!("repeats show {noise}"),
+            Some("instrument") => format!("the noise is {noise}"),
+            _ => "the noise is not known".into(),
         };
         let is = |kind: VerdictKind| v.verdict == kind.name();
         let nameless = self.findings.0.iter().filter(|finding| finding.effect == names::UNKNOWN).count();
-        let held_out = v.after_rms_mm.zip(v.leftover_rms_mm).filter(|(held_out, fitted)| held_out > &(NOT_CARRIED * fitted));
-        match held_out.filter(|_| v.held_out) {
+        match v.after_rms_mm.filter(|_| v.held_out) {
             _ if is(VerdictKind::WrongSetup) => "wrong set-up: correct it first; nothing was calibrated".into(),
             _ if is(VerdictKind::NotAsked) => "not asked: too few points were fitted".into(),
             _ if is(VerdictKind::NothingMissing) => format!("nothing missing: {left} rms remain, {noise}"),
             _ if is(VerdictKind::Explained) => format!("explained: {left} rms remain, {noise}"),
-            Some((held_out, _)) => format!("unexplained: {} rms remain at held-out points, {left} at fitted ones", length(held_out)),
-            None if nameless > 0 => {
-                format!("unexplained in part: {left} rms remain, {nameless} of {} causes unknown", self.findings.0.len())
+            _ if nameless > 0 => {
+                format!("unexplained in part: {left} rms remain, {nameless} of {} causes unnamed", self.findings.0.len())
             }
+            Some(held_out) => format!("unexplained: {left} rms remain at fitted points, {} at held-out ones", length(held_out)),
             None => format!("unexplained: {left} rms remain, {noise}"),
         }
     }
@@ -57,9 +52,7 @@ impl DiagnosisSummary {
             place: &finding.place,
             statement: &finding.statement,
             forms: &finding.forms,
-            numbers: numbers
-                .map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma })
-                .collect(),
+            numbers: numbers.map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma }).collect(),
             probability: finding.probability.filter(|_| finding.delta_bic.is_some()),
             rivals: rivals
                 .map(|rival| NamedRival {
@@ -79,10 +72,14 @@ impl DiagnosisSummary {
         let mut text = screen::measured(
             self.robot.as_deref(),
             &format!("{} points, {} fitted", self.rows, v.points),
-            v.noise_floor_mm.map(length).or_else(|| v.noise_floor_rad.map(angle)).map(|size| screen::noise(&size, v.noise_basis.as_deref())).as_deref(),
+            v.noise_floor_mm
+                .map(length)
+                .or_else(|| v.noise_floor_rad.map(angle))
+                .map(|size| screen::noise(&size, v.noise_basis.as_deref()))
+                .as_deref(),
         );
         let rows = if v.held_out { "held-out points" } else { "fitted points: flattered" };
-        let [before, after] = [format!("geometry identified, {rows}"), "with the findings".to_string()];
+        let [before, after] = [format!("geometry identified, {rows}"), screen::with_findings(self.findings.0.len()).to_string()];
         let pair = |mean: Option<f64>, max: Option<f64>| Some([mean?, max?]);
         if let (Some(first), Some(last)) = (pair(v.before_mean_mm, v.before_max_mm), pair(v.after_mean_mm, v.after_max_mm)) {
             let least = first[0].min(last[0]);
@@ -112,12 +109,12 @@ impl DiagnosisSummary {
         }
         let withdrawn = self.said(VerdictTopic::Withdrawn).len();
         text.push_str(&screen::withdrawn(withdrawn));
-        let aside: Vec<String> = self.worst_aside().iter().map(|row| format!("{} ({})", row.point_id, length(row.size_mm))).collect();
+        let aside: Vec<String> =
+            self.worst_aside().iter().map(|row| format!("{} ({})", row.point_id, length(row.size_mm))).collect();
         text.push_str(&screen::names("set aside", &aside, width));
-        let unseen = self.said(VerdictTopic::NotObservable);
-        let unseen = unseen.iter().map(|line| line.split_once(": ").map_or(*line, |(what, _)| what).replace('_', " "));
-        text.push_str(&screen::names("not seen", &unseen.collect::<Vec<_>>(), width));
-        text.push_str(&self.next_step(store).map_or_else(String::new, |step| step.text(width)));
+        text.push_str(&screen::not_seen(&self.said(VerdictTopic::NotObservable), width));
+        let next = self.next_step(store).or_else(|| (!self.is_wrong_setup()).then(|| NextStep::correct(&self.run, store)));
+        text.push_str(&next.map_or_else(String::new, |step| step.text(width)));
         text + &labelled("more", "--details prints numbers, places, formulas, reasons and every rival")
     }
 
@@ -126,25 +123,29 @@ impl DiagnosisSummary {
         self.rivals.0.iter().filter(|rival| rival.rank == finding.rank && rival.is_inseparable())
     }
 
-    /// What decides the least certain finding; else what shows a joint that was not seen.
+    /// What decides the largest finding whose name is not certain; else what shows a joint that was not seen.
     pub(in crate::summary) fn next_step(&self, store: &str) -> Option<NextStep> {
+        let size = |short: &ShortFinding| short.size.as_ref().map_or(0.0, |(size, _)| *size);
+        let found = self.found();
+        let undecided = found.iter().zip(&self.findings.0).filter(|(short, _)| short.instead.is_some());
+        let mut undecided: Vec<(&ShortFinding, &FindingRow)> = undecided.collect();
+        undecided.sort_by(|a, b| size(b.0).total_cmp(&size(a.0)));
         let lines = self.next(store).unwrap_or_default();
-        let undecided = self.findings.0.iter().filter(|finding| {
-            is_separable_by_poses(&finding.effect) && self.rivals_of(finding).any(|rival| is_separable_by_poses(&rival.effect))
+        let poses = undecided.into_iter().find_map(|(short, finding)| {
+            let start = format!("poses for finding {} or ", finding.rank);
+            let (rival, command) = lines.iter().find_map(|line| line.strip_prefix(&start))?.split_once(": ")?;
+            let (effect, place) = rival.split_once(" at ")?;
+            let what = format!("measure poses to decide: {}, or {}", short.what, words(effect, place));
+            Some(NextStep { what, command: Some(command.into()) })
         });
-        let least = undecided.min_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
-        let poses = least.and_then(|finding| lines.iter().find(|line| line.starts_with(&format!("poses for finding {} or ", finding.rank))));
-        let command = poses.and_then(|line| line.split_once(": ")).map(|(_, command)| command);
-        if let (Some(finding), Some(command)) = (least, command) {
-            let what = format!("measure poses that decide finding {}", finding.rank);
-            return Some(NextStep { what, command: Some(command.into()) });
+        if poses.is_some() {
+            return poses;
         }
         if self.verdict.is_noise_inferred() {
             return Some(NextStep { what: "state `instrument` in `ingest`, and measure ten poses twice".into(), command: None });
         }
-        let other = lines.iter().find_map(|line| line.split_once(": ")).map(|(_, how)| how.to_string());
-        let joint = || self.said(VerdictTopic::NotObservable).into_iter().find(|line| line.starts_with("joint "));
-        let unseen = || joint()?.split_once(": ").map(|(joint, why)| format!("{joint}: {}", why.rsplit("; ").next().unwrap_or(why)));
-        other.or_else(unseen).map(|what| NextStep { what, command: None })
+        let joint = self.said(VerdictTopic::NotObservable).into_iter().find(|line| line.starts_with("joint "))?;
+        let (joint, why) = joint.split_once(": ")?;
+        Some(NextStep { what: format!("{joint}: {}", why.rsplit("; ").next().unwrap_or(why)), command: None })
     }
 }
