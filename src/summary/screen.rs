@@ -96,13 +96,13 @@ pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
     let sizes: Vec<&str> = findings[..told].iter().map(|one| one.size.as_ref().map_or("", |(_, size)| size.as_str())).collect();
     let right = sizes.iter().map(|size| size.width()).max().unwrap_or(0);
     let room = width.saturating_sub(LABEL);
-    let half = room / 2;
+    let half = room / 2 + 1;
     let mut cells: Vec<String> =
         sizes.iter().zip(&findings).map(|(size, one)| cut(&format!("{size:>right$}  {}", one.what), room)).collect();
     if smaller > 0 {
         cells.push(format!("{:right$}  and {smaller} smaller", ""));
     }
-    let paired = width >= WIDTH && cells.iter().all(|cell| cell.width() < half);
+    let paired = width >= WIDTH && cells.iter().all(|cell| cell.width() + 2 <= half);
     let each = if paired { 2 } else { 1 };
     let line = |(number, cells): (usize, &[String])| {
         let text = match cells {
@@ -117,10 +117,12 @@ pub(super) fn found(mut findings: Vec<ShortFinding>, width: usize) -> String {
 /// A finding with its number under its rank; what it might be instead stands beside it where there is room, else below.
 pub(super) fn ranked(rank: i64, finding: &ShortFinding, at: &str, width: usize) -> String {
     let room = width.saturating_sub(LABEL);
-    let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
-    let figures: Vec<&str> = finding.number.iter().chain(&size).map(String::as_str).collect();
-    let told = if figures.is_empty() { finding.what.clone() } else { format!("{}: {}", finding.what, figures.join(", ")) };
-    let told = cut(&told, room);
+    let told = |at: &str| {
+        let size = finding.size.as_ref().map(|(_, size)| format!("{size}{at}"));
+        let figures: Vec<&str> = finding.number.iter().chain(&size).map(String::as_str).collect();
+        if figures.is_empty() { finding.what.clone() } else { format!("{}: {}", finding.what, figures.join(", ")) }
+    };
+    let told = Some(told(at)).filter(|text| text.width() <= room).unwrap_or_else(|| cut(&told(""), room));
     let label = format!("{rank:>3}.");
     match &finding.instead {
         Some(instead) if told.width() + instead.width() + 2 <= room => labelled(&label, &format!("{told}; {instead}")),
@@ -173,9 +175,9 @@ mod tests {
     fn the_five_largest_findings_stand_two_a_line_and_the_others_are_counted() {
         assert_eq!(
             found(several(17), 100),
-            "found     17.00 mm  joint 17 yields under load         16.00 mm  joint 16 yields under load\n          \
-             15.00 mm  joint 15 yields under load         14.00 mm  joint 14 yields under load\n          \
-             13.00 mm  joint 13 yields under load                   and 12 smaller\n"
+            "found     17.00 mm  joint 17 yields under load          16.00 mm  joint 16 yields under load\n          \
+             15.00 mm  joint 15 yields under load          14.00 mm  joint 14 yields under load\n          \
+             13.00 mm  joint 13 yields under load                    and 12 smaller\n"
         );
         assert_eq!(found(several(6), 100).lines().count(), 3);
         let narrow = found(several(17), 80);

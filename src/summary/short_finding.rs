@@ -248,7 +248,7 @@ mod tests {
     use super::*;
     use crate::effect::CAUSES;
 
-    fn number(name: &str, value: f64, unit: &'static str, sigma: f64) -> FindingNumber<'_> {
+    fn number<'a>(name: &'a str, value: f64, unit: &'a str, sigma: f64) -> FindingNumber<'a> {
         FindingNumber { name, value, unit, sigma: Some(sigma) }
     }
 
