@@ -108,7 +108,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
         text.push_str(&limits.text());
     }
     text.push_str(&summary::rejected(&outcome.manifest));
-    let more = if arguments.details || short.is_none() { "" } else { " (--details prints every step and set)" };
+    let more = if arguments.details || short.is_none() { "" } else { " (--details: every step and set)" };
     for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
         text.push_str(&labelled("report", &format!("{}{more}", path.display())));
     }

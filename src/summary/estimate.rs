@@ -33,7 +33,7 @@ pub(super) fn estimate(value: f64, sigma: Option<f64>, unit: &str) -> String {
     let scale = 10f64.powi(power);
     let value = value / scale;
     // One that shows in no digit is as good as none.
-    let sigma = sigma.map(|sigma| sigma / scale).filter(|sigma| decimals(*sigma, 1) <= decimals(value, MOST));
+    let sigma = sigma.map(|sigma| sigma / scale).filter(|sigma| *sigma > 0.0 && decimals(*sigma, 1) <= decimals(value, MOST));
     let decimals = sigma.map_or_else(|| decimals(value, MOST), |sigma| decimals(sigma, 1));
     let number = match sigma {
         Some(sigma) => format!("{value:.decimals$} +- {sigma:.decimals$}"),

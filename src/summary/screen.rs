@@ -27,7 +27,7 @@ pub(super) fn measured(robot: Option<&str>, rows: &str, noise: Option<&str>) -> 
 /// Mean and largest error of a step (mm), with the decimals that suit the smaller of all means.
 pub(super) fn errors(label: &str, [mean, largest]: [f64; 2], least: f64, of: &str) -> String {
     let decimals = if least < SMALL { 4 } else { 3 };
-    labelled(label, &format!("{mean:>8.decimals$} mm mean {largest:>8.decimals$} mm largest   {of}"))
+    labelled(label, &format!("{mean:>7.decimals$} mm mean {largest:>8.decimals$} mm largest  {of}"))
 }
 
 /// What the noise is and rests on.

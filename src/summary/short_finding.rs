@@ -81,7 +81,7 @@ const PHRASES: &[(&str, &str, Told)] = &[
     ("base_compliance", "{} tilts under load", Largest),
     ("gear_cyclic", "{} errs with its angle", Amplitude),
     ("gear_motor_cyclic", "{} errs with its motor", Amplitude),
-    ("gear_flank", "{} errs with angle and direction", Amplitude),
+    ("gear_flank", "{} errs with angle and side", Amplitude),
     ("gear_load", "{} errs with angle and load", Amplitude),
     ("joint_table", "{} errs with its angle, irregularly", No),
     ("backlash", "{} has backlash", Twice),
@@ -135,7 +135,7 @@ fn phrase(effect: &str) -> Option<(&'static str, Told)> {
 pub(super) fn words(effect: &str, place: &str) -> String {
     match phrase(effect) {
         Some((words, _)) => words.replace("{}", place),
-        None if effect == names::UNKNOWN => format!("{place}: unknown cause"),
+        None if effect == names::UNKNOWN => format!("unknown cause at {place}"),
         None => format!("{} at {place}", effect.replace('_', " ")),
     }
 }
@@ -312,7 +312,7 @@ mod tests {
         let near = FoundCause { forms: r#"[{"joint_compliance": {}}]"#, rivals: rivals(), ..found("unknown", numbers()) };
         assert_eq!(said(near), ["joint 3 yields under load, roughly", "(4.17 +- 0.02)e-7 rad/Nm", ""]);
         let far = FoundCause { forms: r#"[{"unknown": {}}]"#, rivals: rivals(), ..found("unknown", numbers()) };
-        assert_eq!(said(far), ["joint 3: unknown cause", "", ""]);
+        assert_eq!(said(far), ["unknown cause at joint 3", "", ""]);
     }
 
     #[test]

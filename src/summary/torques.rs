@@ -99,9 +99,9 @@ impl TorqueSummary {
         let v = &self.verdict;
         let rows = format!("{} rows at {:.0} Hz, low-pass {:.1} Hz", v.rows, v.rate_hz, v.cutoff_hz);
         let rows = screen::measured(self.robot.as_deref(), &rows, None);
-        let of = if v.held_out { "held-out rows" } else { "fitted rows: flattered" };
+        let of = if v.held_out { "held out" } else { "fitted rows: flattered" };
         let line = |label: &str, share: f64, what: &str| {
-            labelled(label, &format!("{:>8.2} % rms of the torques, mean over joints   {what}", 100.0 * share))
+            labelled(label, &format!("{:>7.2} % of the torques' rms, mean over joints  {what}", 100.0 * share))
         };
         rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}"))
             + &line("after", v.after_nrmse, screen::with_findings(self.findings.len()))
@@ -206,7 +206,7 @@ impl TorqueSummary {
         text.push_str(&screen::withdrawn(self.said(VerdictTopic::Withdrawn).len()));
         text.push_str(&screen::not_seen(&self.said(VerdictTopic::NotObservable), width));
         text.push_str(&Self::next_step(&self.run, store).text(width));
-        text + &labelled("more", "--details prints numbers, joints, noise and what was decided from the recording")
+        text + &labelled("more", "--details prints numbers, joints, noise and all that was decided")
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it.

@@ -78,7 +78,7 @@ impl DiagnosisSummary {
                 .map(|size| screen::noise(&size, v.noise_basis.as_deref()))
                 .as_deref(),
         );
-        let rows = if v.held_out { "held-out points" } else { "fitted points: flattered" };
+        let rows = if v.held_out { "held out" } else { "fitted points: flattered" };
         let [before, after] = [format!("geometry identified, {rows}"), screen::with_findings(self.findings.0.len()).to_string()];
         let pair = |mean: Option<f64>, max: Option<f64>| Some([mean?, max?]);
         if let (Some(first), Some(last)) = (pair(v.before_mean_mm, v.before_max_mm), pair(v.after_mean_mm, v.after_max_mm)) {
@@ -88,7 +88,7 @@ impl DiagnosisSummary {
         }
         if let (Some(first), Some(last)) = (v.before_rms_rad, v.after_rms_rad) {
             for (label, rad, of) in [("before", first, &before), ("after", last, &after)] {
-                text.push_str(&labelled(label, &format!("{:>8.1} arcsec rms   {of}", Unit::Arcsecond.from_si(rad))));
+                text.push_str(&labelled(label, &format!("{:>7.1} arcsec rms  {of}", Unit::Arcsecond.from_si(rad))));
             }
         }
         text
