@@ -83,7 +83,7 @@ const PHRASES: &[(&str, &str, Told)] = &[
     ("gear_motor_cyclic", "{} errs with its motor", Amplitude),
     ("gear_flank", "{} errs with angle and side", Amplitude),
     ("gear_load", "{} errs with angle and load", Amplitude),
-    ("joint_table", "{} errs with its angle, irregularly", No),
+    ("joint_table", "{} errs irregularly", No),
     ("backlash", "{} has backlash", Twice),
     ("presliding", "{} has gradual backlash", Twice),
     ("thermal_growth", "{} grows with temperature", Largest),
