@@ -10,6 +10,8 @@ use nalgebra::Vector3;
 const COVERAGE: f64 = 1.96;
 /// Recorded poses at which the usual uncertainty is asked, at most.
 const POSES: usize = 60;
+/// m: a smaller correction is rounding and has no direction.
+const NOTHING: f64 = 1e-9;
 /// A finding is named where it makes at least this share of the whole by itself.
 const NAMED: f64 = 0.5;
 /// A correction is doubtful from this share of itself on ...
@@ -70,11 +72,11 @@ impl Uncertainty {
     pub fn of_correction(&self, reach: &mut Reach, q: &[f64], correction: &Vector3<f64>) -> CorrectionUncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q);
         let size = correction.norm();
-        let along = if size > 0.0 { correction / size } else { Vector3::zeros() };
+        let along = if size > NOTHING { correction / size } else { Vector3::zeros() };
         let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
         let jacobian = self.along(reach, q, &along);
         let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
-        let seen = |one: &&BeyondFitted| COVERAGE * by_range(one).sqrt() > SEEN * self.instrument;
+        let seen = |one: &&BeyondFitted| COVERAGE * by_range(one).sqrt() > self.instrument;
         let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
