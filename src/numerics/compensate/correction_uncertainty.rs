@@ -76,7 +76,7 @@ impl Uncertainty {
         let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
         let jacobian = self.along(reach, q, &along);
         let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
-        let seen = |one: &&BeyondFitted| COVERAGE * by_range(one).sqrt() > self.instrument;
+        let seen = |one: &&BeyondFitted| COVERAGE * one.share * one.displacement.norm() > self.instrument;
         let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
