@@ -3,6 +3,7 @@
 use super::execution_arguments::{CommandTask, ExecutionArguments, shown};
 use super::pipeline_arguments::told_as;
 use super::run::WRONG_SETUP;
+use super::surroundings::columns;
 use super::{complain, emit_json, emit_lines};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
@@ -15,7 +16,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
+/// Say what physics a simulation lacks: where it differs from the recording, and how much better the model is with it.
 ///
 /// Runs the `diagnose` stage of a pipeline and what it needs; of a run, shows what was said then, computing nothing. The simulation is
 /// the nominal robot with its geometry, reduction ratios and declared couplings identified from the recording; everything else is a
@@ -103,7 +104,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     if arguments.json {
         emit_json(&told.document(&store))?;
     } else {
-        let text = if arguments.details { told.text(&store) } else { told.short(&store) };
+        let text = if arguments.details { told.text(&store) } else { told.short(&store, columns()) };
         emit_lines(&(text + &rejected(&manifest)))?;
     }
     Ok(if told.is_wrong_setup() { WRONG_SETUP } else { 0 })

@@ -8,7 +8,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Take away the tables that neither tagged runs nor the last runs of any pipeline need. Manifests always stay.
+/// Take away tables that no run needs: neither a tagged one nor the last ones of any pipeline. Manifests always stay.
 ///
 /// Never runs by itself, never while a run is in flight, and leaves everything that is younger than the grace period.
 #[derive(Args)]

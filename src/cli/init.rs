@@ -9,7 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Write a robot file and a pipeline to start from, with comments, for the columns found in your recordings.
+/// Write a robot file and a pipeline to start from: with comments, for the columns found in your recordings.
 ///
 /// Nothing is asked and nothing is overwritten. What was read from the files' columns is a proposal: lines to look at are marked CHECK, numbers
 /// to fill in REPLACE. Then: `calib check pipeline.yaml`, `calib run pipeline.yaml`.

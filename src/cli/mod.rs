@@ -13,6 +13,7 @@ mod export;
 mod feed_forward;
 mod fleet;
 mod gc;
+mod help;
 mod init;
 mod lineage;
 mod log;
@@ -35,7 +36,7 @@ mod verify_robot;
 
 use crate::error::{Error, Result, counted, nearest};
 use clap::error::{ContextKind, ContextValue};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::Path;
@@ -51,31 +52,31 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    Run(run::RunArguments),
+    Init(init::InitArguments),
     Check(check::CheckArguments),
-    Compensate(Box<compensate::CompensateArguments>),
+    Run(run::RunArguments),
     Diagnose(diagnose::DiagnoseArguments),
-    Effects(effects::EffectsArguments),
+    Compensate(Box<compensate::CompensateArguments>),
+    VerifyRobot(verify_robot::VerifyRobotArguments),
+    Export(export::ExportArguments),
+    Show(show::ShowArguments),
+    Log(log::LogArguments),
     Diff(diff::DiffArguments),
+    Explain(explain::ExplainArguments),
+    Query(query::QueryArguments),
+    Lineage(lineage::LineageArguments),
+    Schema(schema::SchemaArguments),
+    Poses(poses::PosesArguments),
     Excite(excite::ExciteArguments),
     Fleet(fleet::FleetArguments),
-    Export(export::ExportArguments),
-    Init(init::InitArguments),
-    Explain(explain::ExplainArguments),
-    Gc(gc::GcArguments),
-    Lineage(lineage::LineageArguments),
-    Log(log::LogArguments),
-    Poses(poses::PosesArguments),
-    Query(query::QueryArguments),
-    Robots(robots::RobotsArguments),
-    Schema(schema::SchemaArguments),
-    Show(show::ShowArguments),
-    Simulate(simulate::SimulateArguments),
-    Completions(shell::CompletionsArguments),
-    Man(shell::ManArguments),
     Tag(tag::TagArguments),
     Verify(verify::VerifyArguments),
-    VerifyRobot(verify_robot::VerifyRobotArguments),
+    Gc(gc::GcArguments),
+    Simulate(simulate::SimulateArguments),
+    Effects(effects::EffectsArguments),
+    Robots(robots::RobotsArguments),
+    Completions(shell::CompletionsArguments),
+    Man(shell::ManArguments),
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, init understood nothing of the recordings, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected, or the set-up is wrong (do not retry); \
@@ -83,12 +84,13 @@ const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a differenc
 
 /// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
 pub fn command() -> clap::Command {
-    Arguments::command()
+    help::grouped(Arguments::command())
 }
 
 /// Runs a command line, prints what comes of it and gives the exit code.
 pub fn main(arguments: Vec<OsString>) -> u8 {
-    let parsed = match Arguments::try_parse_from(&arguments) {
+    let found = command().try_get_matches_from(&arguments).and_then(|found| Arguments::from_arg_matches(&found));
+    let parsed = match found {
         Ok(parsed) => parsed,
         Err(error) => {
             let error = with_nearest_verb(error);

@@ -4,16 +4,32 @@ use crate::summary::LABEL;
 use anstyle::{AnsiColor, Style};
 
 /// Labels of lines that say what is to be seen to, and all others.
-const ALARMS: [&str; 3] = ["warning", "rejected", "withdrawn"];
-const LABELS: [&str; 11] =
-    ["before", "after", "noise", "verdict", "findings", "report", "done", "error", "limits", "next", "more"];
+const ALARMS: [&str; 4] = ["warning", "doubt", "rejected", "withdrawn"];
+const LABELS: [&str; 14] = [
+    "robot",
+    "before",
+    "after",
+    "carried",
+    "found",
+    "verdict",
+    "next",
+    "report",
+    "limits",
+    "not seen",
+    "set aside",
+    "done",
+    "error",
+    "more",
+];
 
 /// What a verdict begins with, and its colour.
-const VERDICTS: [(&str, AnsiColor); 5] = [
+const VERDICTS: [(&str, AnsiColor); 7] = [
     ("explained", AnsiColor::Green),
     ("nothing missing", AnsiColor::Green),
     ("unexplained", AnsiColor::Yellow),
+    ("identified", AnsiColor::Yellow),
     ("not asked", AnsiColor::Yellow),
+    ("wrong set-up", AnsiColor::Red),
     ("not accepted", AnsiColor::Red),
 ];
 

@@ -40,6 +40,11 @@ impl PipelineArguments {
         self.means.plan_with(&self.pipeline, &sets)
     }
 
+    /// See [`ExecutionArguments::store_again`].
+    pub fn store_again(&self) -> String {
+        self.means.store_again()
+    }
+
     pub fn store(&self) -> Result<Store> {
         self.means.store()
     }

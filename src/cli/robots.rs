@@ -6,7 +6,7 @@ use crate::robot::{LIBRARY, LibraryArm};
 use crate::units::Unit;
 use clap::Args;
 
-/// List the arms of the library, which `calib init` starts from, or print the robot file of one.
+/// List the arms that `calib init` starts from, or print the robot file of one.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib robots

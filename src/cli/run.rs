@@ -1,6 +1,7 @@
 //! `calib run`: runs what is not already done.
 
 use super::pipeline_arguments::PipelineArguments;
+use super::surroundings::columns;
 use super::{complain, emit, emit_json, emit_lines};
 use crate::error::{Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
@@ -8,7 +9,7 @@ use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, 
 use crate::raw::ending;
 use crate::report::PageLanguage;
 use crate::store::Store;
-use crate::summary::{self, LimitsSummary, labelled};
+use crate::summary::{self, LimitsSummary, ResultScreen, labelled};
 use crate::table::Withdrawn;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -92,7 +93,9 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
         emit_json(&document(&outcome, &limits, &store)?)?;
         return Ok(code);
     }
-    let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store)?;
+    let (again, columns) = (shared.store_again(), columns());
+    let on = ResultScreen { store: &again, columns };
+    let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store, on)?;
     let mut text = String::new();
     if arguments.details || short.is_none() {
         text.push_str(&summary::statistics(&outcome, standing.as_ref(), &store)?);
@@ -105,26 +108,28 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
         text.push_str(&limits.text());
     }
     text.push_str(&summary::rejected(&outcome.manifest));
+    let more = if arguments.details || short.is_none() { "" } else { " (--details: every step and set)" };
     for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
-        text.push_str(&labelled("report", &path.display().to_string()));
+        text.push_str(&labelled("report", &format!("{}{more}", path.display())));
     }
-    let more = if arguments.details || short.is_none() { "" } else { "; --details prints every step and set" };
-    text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64(), more));
+    if arguments.details || short.is_none() || outcome.nothing_done() {
+        text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64()));
+    }
     emit_lines(&text)?;
     Ok(code)
 }
 
-/// What was done; `more` is said behind it.
-fn closing(outcome: &CompletedRun, seconds: f64, more: &str) -> String {
+/// What was done.
+fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
-        return labelled("done", &format!("nothing to do: {} cached ({seconds:.1} s){more}", counted(stages.len(), "stage")));
+        return labelled("done", &format!("nothing to do: {} cached ({seconds:.1} s)", counted(stages.len(), "stage")));
     }
     let (executed, cached, not_run) = (count(StageStatus::Executed), count(StageStatus::Cached), count(StageStatus::NotRun));
     let not_run = if not_run > 0 { format!(", {not_run} not selected") } else { String::new() };
     let (executed, run) = (counted(executed, "stage"), &outcome.manifest.run_id);
-    labelled("done", &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}{more}"))
+    labelled("done", &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}"))
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {

@@ -9,7 +9,7 @@ use crate::error::Result;
 use clap::{Args, Subcommand};
 use std::ffi::OsString;
 
-/// Make recordings of a simulated robot with stated or hidden effects, and mark what a diagnosis made of them.
+/// Make recordings of a simulated robot: with stated or hidden effects; and mark what a diagnosis made of them.
 #[derive(Args)]
 pub(super) struct SimulateArguments {
     #[command(subcommand)]

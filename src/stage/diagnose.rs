@@ -5,7 +5,7 @@ use crate::effect::{CAUSES, names};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
-use crate::robot::{Measurements, RobotModel, Visited};
+use crate::robot::{Measurements, RobotModel};
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::brought;
 use crate::stage::doubtful::{self, KnownModel};
@@ -100,7 +100,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 31;
+    const IMPLEMENTATION: u32 = 32;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -189,9 +189,7 @@ impl Stage for Diagnose {
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
         let known = covariance.filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
-        let visited = Visited::of(&data, &diagnosis.kept);
-        let doubtful =
-            KnownModel { model: &diagnosis.model, covariance: known, measured: &data, visited: known.map(|_| &visited) };
+        let doubtful = KnownModel { model: &diagnosis.model, covariance: known, measured: &data };
         let prediction = Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
             .with_suspects(aside)
             .with_weights(&diagnosis.kept, &diagnosis.fitted)

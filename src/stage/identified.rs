@@ -4,7 +4,7 @@ use crate::effect::Load;
 use crate::error::counted;
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect};
 use crate::observation::noise;
-use crate::robot::{Measurements, NoiseBasis, RobotModel, Visited};
+use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::doubtful::KnownModel;
 use crate::stage::folding::FoldSetting;
@@ -134,9 +134,8 @@ pub struct Fitting<'a> {
     pub repeatability: Option<f64>,
     /// Parts of a cross-validation.
     pub folds: FoldSetting,
-    /// What the model as a whole was identified by, and what its rows visited.
+    /// What the model as a whole was identified by.
     pub measured: &'a Measurements,
-    pub visited: Option<&'a Visited>,
     /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
     pub doubtful: Vec<usize>,
     /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
@@ -167,8 +166,7 @@ impl Identified {
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
-        let Fitting { measured, visited, .. } = *fitting;
-        let known = KnownModel { model, covariance: of_model.as_ref(), measured, visited };
+        let known = KnownModel { model, covariance: of_model.as_ref(), measured: fitting.measured };
         let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,

@@ -7,7 +7,7 @@ use crate::effect::{Effect, EffectContext, EffectStack, arm_effect, identified, 
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out};
 use crate::observation;
-use crate::robot::{Measurements, RobotModel, Visited};
+use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::stage::brought;
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
@@ -64,7 +64,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 15;
+    const IMPLEMENTATION: u32 = 16;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -127,7 +127,6 @@ impl Stage for Identify {
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
-        let visited = Visited::of(&data, &screening.kept);
         let (model, placed) = placed_by_left_out(&model, &data, &rows);
         let fitting = Fitting {
             data: &data,
@@ -144,7 +143,6 @@ impl Stage for Identify {
             repeatability,
             folds: self.folds,
             measured: &data,
-            visited: Some(&visited),
             doubtful: (0..data.rows()).filter(|row| rows.binary_search(row).is_err()).collect(),
             placed: &placed,
         };

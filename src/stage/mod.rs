@@ -8,7 +8,6 @@ mod compare_torques;
 mod computed;
 mod copied;
 mod curves;
-mod dependence;
 mod diagnose;
 mod diagnose_torques;
 mod doubtful;

@@ -3,7 +3,7 @@
 use crate::effect::names;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::FitOptions;
-use crate::robot::{RobotModel, Visited};
+use crate::robot::RobotModel;
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
@@ -35,7 +35,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 15;
+    const IMPLEMENTATION: u32 = 16;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -73,7 +73,6 @@ impl Stage for Stiffness {
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let held: Vec<usize> = own.into_iter().filter(|k| !candidates.contains(k)).collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
-        let visited = Visited::of(&data, &screening.kept);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -89,7 +88,6 @@ impl Stage for Stiffness {
             repeatability,
             folds: self.folds,
             measured: &data,
-            visited: Some(&visited),
             doubtful: (0..data.rows()).filter(|row| !seen_before[*row] && rows.binary_search(row).is_err()).collect(),
             placed: &std::collections::BTreeMap::new(),
         };

@@ -8,7 +8,7 @@ use crate::diagnose::BASE;
 use crate::effect::names;
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
-use crate::robot::{Measurements, RobotModel, Visited};
+use crate::robot::{Measurements, RobotModel};
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Labelled, Stage};
@@ -47,7 +47,7 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 11;
+    const IMPLEMENTATION: u32 = 12;
     type Reads = TransferReads;
     type Writes = Identified;
 
@@ -89,7 +89,6 @@ impl Stage for Transfer {
         }
         let CarriedModel { earlier, model, fitted, screening, held } = &carried;
         let source_data = source.as_ref().map(|source| source.recording.measurements());
-        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -105,16 +104,15 @@ impl Stage for Transfer {
             repeatability,
             folds: self.folds,
             measured: source_data.as_ref().unwrap_or(&data),
-            visited: visited.as_ref(),
             doubtful: (0..data.rows()).collect(),
             placed: &std::collections::BTreeMap::new(),
         };
         let identified = Identified::of(context, model, fitted, &fitting);
-        let outside = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();
-        if outside > 0 {
-            let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
+        let doubtful = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();
+        if doubtful > 0 {
+            let rows = counted(data.rows(), "row");
             context.services.note(format!(
-                "{outside} of {rows} {lie} outside of what the model was measured at, or where it is uncertain: see the remarks of `prediction`"
+                "{doubtful} of {rows}: the correction is uncertain by more than half of itself, see the remarks of `prediction`"
             ));
         }
         Ok(identified)
@@ -197,19 +195,4 @@ fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> C
     let whole: Vec<usize> = (0..data.rows()).filter(|row| data.has_point(*row) && !aside(*row)).collect();
     let (choose, others): (Vec<usize>, Vec<usize>) = whole.into_iter().partition(|row| asked.contains(row));
     ComparedRows { judge: if others.is_empty() { choose.clone() } else { others }, choose }
-}
-
-/// What was visited where the model was fitted, else by all other recordings; nothing where there is no other.
-fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Recording) -> Option<Visited> {
-    if let Some(source) = source {
-        return Some(Visited::of(&source.recording.measurements(), &source.rows));
-    }
-    let mut others = all.iter().map(|one| &one.table).filter(|table| table.q != own.q && table.joints == own.joints);
-    let mut visited = others.next()?.measurements();
-    for more in others.map(Recording::measurements) {
-        visited.q.extend(more.q);
-        visited.payload.extend(more.payload);
-        visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
-    }
-    Some(Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>()))
 }

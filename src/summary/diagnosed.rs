@@ -1,6 +1,8 @@
 //! A diagnosis of either kind: of positions or of torques.
 
-use super::{DiagnosisSummary, TorqueSummary};
+use super::screen::{self, NextStep};
+use super::short_finding::ShortFinding;
+use super::{DiagnosisSummary, TorqueSummary, labelled};
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::stage::{DiagnoseTorques, Stage};
@@ -19,7 +21,7 @@ impl Diagnosed {
     /// What the stage of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         if stage.uses == DiagnoseTorques::NAME {
-            return TorqueSummary::read(stage, store).map(|told| Self::Torques(Box::new(told)));
+            return TorqueSummary::read(run, stage, store).map(|told| Self::Torques(Box::new(told)));
         }
         DiagnosisSummary::read(run, stage, store).map(|told| Self::Positions(Box::new(told)))
     }
@@ -57,14 +59,25 @@ impl Diagnosed {
     }
 
     /// The verdict and a line a finding.
-    pub fn short(&self, store: &str) -> String {
+    pub fn short(&self, store: &str, columns: Option<usize>) -> String {
+        let width = screen::width(columns);
         match self {
-            Self::Positions(told) => told.short(store),
-            Self::Torques(told) => told.short(),
+            Self::Positions(told) => told.short(store, width),
+            Self::Torques(told) => told.short(store, width),
         }
     }
 
-    /// The verdict and what it rests on, in one sentence.
+    /// The same in ten lines, with the largest findings alone.
+    pub(super) fn in_short(&self, width: usize, store: &str) -> String {
+        let head = match self {
+            Self::Positions(told) => told.head(),
+            Self::Torques(told) => told.head(),
+        };
+        let next = self.next_step(store).map_or_else(String::new, |step| step.text(width));
+        head + &screen::found(self.found(), width) + &labelled("verdict", &self.verdict()) + &next
+    }
+
+    /// The verdict in at most twelve words.
     pub fn verdict(&self) -> String {
         match self {
             Self::Positions(told) => told.verdict(),
@@ -72,11 +85,19 @@ impl Diagnosed {
         }
     }
 
-    /// The largest findings in a line; nothing where nothing was found.
-    pub fn strongest(&self) -> Option<String> {
+    /// The findings in a few words each.
+    pub(super) fn found(&self) -> Vec<ShortFinding> {
         match self {
-            Self::Positions(told) => told.strongest(),
-            Self::Torques(told) => told.strongest(),
+            Self::Positions(told) => told.found(),
+            Self::Torques(told) => told.found(),
+        }
+    }
+
+    /// What to do next, where the diagnosis says so.
+    pub(super) fn next_step(&self, store: &str) -> Option<NextStep> {
+        match self {
+            Self::Positions(told) => told.next_step(store),
+            Self::Torques(_) => Some(TorqueSummary::next_step("HEAD", store)),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
 
+use super::screen::cut;
 use crate::audit::{QueryResult, QueryValue};
 use crate::error::{counted, one_line};
-use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+use unicode_width::UnicodeWidthStr;
 
 /// Significant digits of the largest number of a column.
 const DIGITS: i32 = 6;
@@ -137,21 +138,6 @@ fn shorten(cells: &mut [String]) {
             cell.pop();
         });
     }
-}
-
-/// A text of this width at most, `…` for what is cut off.
-fn cut(text: &str, width: usize) -> String {
-    if text.width() <= width {
-        return text.into();
-    }
-    let mut out = String::new();
-    for c in text.chars() {
-        if out.width() + c.width().unwrap_or(0) + 1 > width {
-            break;
-        }
-        out.push(c);
-    }
-    out + "…"
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod columns;
 mod corrections;
 mod diagnosed;
 mod diagnosis;
+mod estimate;
 mod explanation;
 mod first_look;
 #[cfg(feature = "query")]
@@ -18,7 +19,9 @@ mod plan;
 mod rival_changes;
 mod run;
 mod run_diff;
+mod screen;
 mod searches;
+mod short_finding;
 mod statistics;
 mod torques;
 
@@ -30,7 +33,7 @@ pub use explanation::explanation;
 pub use first_look::first_look;
 #[cfg(feature = "query")]
 pub use grid::grid;
-pub use in_short::in_short;
+pub use in_short::{ResultScreen, in_short};
 pub use labelled::{LABEL, folded, labelled};
 pub use limits::LimitsSummary;
 #[cfg(feature = "query")]
@@ -44,11 +47,18 @@ pub use statistics::{rejected, rejected_rows, statistics, statistics_json};
 pub use torques::TorqueSummary;
 
 use crate::error::Result;
-use crate::pipeline::CompletedRun;
+use crate::pipeline::{CompletedRun, StageReport};
 use crate::store::Store;
-use crate::table::Table;
+use crate::table::{Robot, Table};
 
 /// All tables of a kind that a run wrote. Fails where one has left the store.
 fn tables<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<Vec<T>> {
     outcome.manifest.tables(T::KIND).map(|output| T::from_frame(&store.load(&output.table)?)).collect()
+}
+
+/// The name of the robot that a stage read; none where it read none. Fails where its table has left the store.
+fn robot_of(stage: &StageReport, store: &Store) -> Result<Option<String>> {
+    let Some(own) = stage.inputs.iter().find(|input| input.port == Robot::KIND) else { return Ok(None) };
+    let robot = Robot::from_frame(&store.load(&own.table)?)?;
+    Ok(robot.0.into_iter().next().map(|base| base.name))
 }

@@ -1,6 +1,10 @@
 //! A diagnosis of torques from its tables, as text and as JSON.
 
-use super::labelled;
+use super::screen::{self, NextStep};
+use super::short_finding::{FindingNumber, FoundCause, NamedRival, ShortFinding};
+use super::{labelled, robot_of};
+use crate::diagnose::VerdictKind;
+use crate::effect::figure;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::store::Store;
@@ -19,14 +23,14 @@ pub struct TorqueSummary {
     rivals: Vec<TorqueRivalRow>,
     joints: Vec<JointTorqueRow>,
     contacts: Vec<ContactRow>,
+    /// Its name.
+    robot: Option<String>,
+    run: String,
 }
-
-/// Findings that a run names in its one line.
-const NAMED: usize = 3;
 
 impl TorqueSummary {
     /// What a stage `diagnose_torques` of a run wrote. Fails where a table has left the store.
-    pub fn read(stage: &StageReport, store: &Store) -> Result<Self> {
+    pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<T> {
             let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
             let own = own.ok_or_else(|| Error::Bug(format!("a diagnosis of torques without its table {}", T::KIND)))?;
@@ -42,6 +46,8 @@ impl TorqueSummary {
             rivals: table::<TorqueRivals>(stage, store)?.0,
             joints: table::<JointTorques>(stage, store)?.0,
             contacts: table::<Contacts>(stage, store)?.0,
+            robot: robot_of(stage, store)?,
+            run: run.into(),
         })
     }
 
@@ -50,18 +56,55 @@ impl TorqueSummary {
         self.verdict.is_wrong_setup()
     }
 
-    /// The verdict and what it rests on, in one sentence.
+    /// The verdict in at most twelve words.
     pub fn verdict(&self) -> String {
-        format!("{}: {}", self.verdict.verdict.replace('_', " "), self.verdict.statement)
+        let worst = self.joints.iter().max_by(|a, b| a.leftover_over_noise.total_cmp(&b.leftover_over_noise));
+        let is = |kind: VerdictKind| self.verdict.verdict == kind.name();
+        match worst {
+            _ if is(VerdictKind::WrongSetup) => "wrong set-up: correct it first; nothing was identified".into(),
+            _ if is(VerdictKind::NothingMissing) => "nothing missing: the rigid arm explains the torques".into(),
+            _ if is(VerdictKind::Explained) => "explained: noise alone remains".into(),
+            Some(row) if is(VerdictKind::Unexplained) => {
+                format!("unexplained: {:.1} times the noise remains at joint {}", row.leftover_over_noise, row.joint)
+            }
+            _ => self.verdict.verdict.replace('_', " "),
+        }
     }
 
-    /// The strongest findings by name, place and size; nothing where nothing was found.
-    pub fn strongest(&self) -> Option<String> {
-        let named = |row: &TorqueFindingRow| format!("{} at {} ({:.2} Nm rms)", row.effect, row.place, row.effect_rms_nm);
-        let named_rows: Vec<String> = self.findings.iter().take(NAMED).map(named).collect();
-        let more = self.findings.len().saturating_sub(NAMED);
-        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        (!named_rows.is_empty()).then(|| format!("{}{more}", named_rows.join(", ")))
+    /// The findings in a few words each, as the table has them.
+    pub(super) fn found(&self) -> Vec<ShortFinding> {
+        self.findings.iter().map(|finding| ShortFinding::of(self.cause(finding), false)).collect()
+    }
+
+    fn cause<'a>(&'a self, finding: &'a TorqueFindingRow) -> FoundCause<'a> {
+        let numbers = self.numbers.iter().filter(|number| number.rank == finding.rank);
+        let rival =
+            |rival: &'a TorqueRivalRow| NamedRival { effect: &rival.effect, place: &rival.place, probability: rival.probability };
+        let size = Some(finding.effect_rms_nm).filter(|nm| *nm > 0.0);
+        FoundCause {
+            effect: &finding.effect,
+            place: &finding.place,
+            statement: &finding.statement,
+            forms: "",
+            numbers: numbers.map(|n| FindingNumber { name: &n.name, value: n.value, unit: &n.unit, sigma: n.sigma }).collect(),
+            probability: Some(finding.probability),
+            rivals: self.rivals_of(finding.rank).into_iter().map(rival).collect(),
+            none: finding.none_probability,
+            size: size.map(|nm| (nm, format!("{} Nm", figure(nm, 1)))),
+        }
+    }
+
+    /// What was measured, and the errors before and after.
+    pub(super) fn head(&self) -> String {
+        let v = &self.verdict;
+        let rows = format!("{} rows at {:.0} Hz, low-pass {:.1} Hz", v.rows, v.rate_hz, v.cutoff_hz);
+        let rows = screen::measured(self.robot.as_deref(), &rows, None);
+        let of = if v.held_out { "held out" } else { "fitted rows: flattered" };
+        let line = |label: &str, share: f64, what: &str| {
+            labelled(label, &format!("{:>7.2} % of the torques' rms, mean over joints  {what}", 100.0 * share))
+        };
+        rows + &line("before", v.before_nrmse, &format!("rigid arm, {of}"))
+            + &line("after", v.after_nrmse, screen::with_findings(self.findings.len()))
     }
 
     fn rivals_of(&self, rank: i64) -> Vec<&TorqueRivalRow> {
@@ -148,34 +191,28 @@ impl TorqueSummary {
         )
     }
 
+    /// Torques to be fed forward by the model of a run.
+    pub(super) fn next_step(run: &str, store: &str) -> NextStep {
+        let command = format!("calib compensate {run} motion.csv --torque{store}");
+        NextStep { what: "feed torques forward".into(), command: Some(command) }
+    }
+
     /// What `calib diagnose` prints unless all is asked for.
-    pub fn short(&self) -> String {
-        let mut text = labelled("verdict", &self.verdict());
-        text.push_str(&labelled("error", &self.errors()));
-        for finding in &self.findings {
-            let rivals = self.rivals_of(finding.rank);
-            let rivals: String =
-                rivals.iter().map(|rival| format!(", of {} at {} {:.2}", rival.effect, rival.place, rival.probability)).collect();
-            let statement = finding.statement.trim_end_matches('.');
-            let told = format!("{statement}; probability of {} {:.2}{rivals}", finding.effect, finding.probability);
-            text.push_str(&labelled(&format!("{:>3}.", finding.rank), &told));
+    pub fn short(&self, store: &str, width: usize) -> String {
+        let mut text = self.head() + &labelled("verdict", &self.verdict());
+        for (finding, row) in self.found().iter().zip(&self.findings) {
+            text.push_str(&screen::ranked(row.rank, finding, " rms", width));
         }
-        for line in self.said(VerdictTopic::Withdrawn) {
-            text.push_str(&labelled("withdrawn", line));
-        }
-        for row in &self.joints {
-            text.extend(row.signature.iter().map(|left| labelled("left", &format!("joint {}: {left}", row.joint))));
-        }
-        let unseen = self.said(VerdictTopic::NotObservable);
-        if !unseen.is_empty() {
-            text.push_str(&labelled("limits", &format!("not observable from these data: {}", unseen.join("; "))));
-        }
-        text + &labelled("more", "--details prints numbers, joints, noise and what was decided from the recording")
+        text.push_str(&screen::withdrawn(self.said(VerdictTopic::Withdrawn).len()));
+        text.push_str(&screen::not_seen(&self.said(VerdictTopic::NotObservable), width));
+        text.push_str(&Self::next_step(&self.run, store).text(width));
+        text + &labelled("more", "--details prints numbers, joints, noise and all that was decided")
     }
 
     /// All of the diagnosis, as `calib diagnose --details` prints it.
     pub fn text(&self) -> String {
-        let mut text = format!("{}\n\nerror: {}\n", self.verdict(), self.errors());
+        let v = &self.verdict;
+        let mut text = format!("{}: {}\n\nerror: {}\n", v.verdict.replace('_', " "), v.statement, self.errors());
         text.push_str("joint   rms before   after   moving   resting   noise  (Nm)  autocorrelation\n");
         let nm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
         for row in &self.joints {

@@ -6,13 +6,13 @@ use crate::observation::KINDS;
 use crate::robot::NoiseBasis;
 
 impl StatisticsRow {
-    /// Which of its points are outside of what the model knows, with their errors; none where none is.
+    /// Which of its points have a doubtful correction, with their errors; none where none has.
     pub fn doubts(&self) -> Option<String> {
         let (mean, max) = self.mean_remarked_mm.zip(self.max_remarked_mm)?;
         let points = self.remarked_points.as_deref().unwrap_or_default();
         let remarked = self.remarked.unwrap_or_default();
         Some(format!(
-            "{remarked} of {} beyond what was fitted or uncertain by more than half of the correction: mean {mean:.4} mm, max {max:.4} mm there; {points}",
+            "{remarked} of {}: the correction is uncertain by more than half of itself; mean {mean:.4} mm, max {max:.4} mm there; {points}",
             counted(self.points as usize, "point")
         ))
     }

@@ -226,7 +226,7 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
 }
 
 #[test]
-fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is_better() {
+fn a_carried_model_says_that_its_geometry_alone_is_better() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let read = settings::<ReadRobot>(json!({"file": file}));
     let desk = Desk::default();
@@ -267,12 +267,8 @@ fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is
     let worse = "what was identified besides it does not hold here";
     let (prediction, warnings) = carry(&parameters);
     assert!(!warnings.contains(worse), "{warnings}");
-    for (row, predicted) in prediction.0.iter().enumerate() {
-        let q1 = recording.q(row)[0];
-        let beyond = predicted.remark.as_ref().is_some_and(|remark| remark.starts_with("joint 1") && remark.contains("beyond"));
-        // Two hundredths of the range on either side are still inside.
-        assert!(beyond == (q1 > 0.1) || (-0.05..0.1).contains(&q1), "{q1}: {:?}", predicted.remark);
-    }
+    // How certain its correction is nobody knows without a covariance.
+    assert!(prediction.0.iter().all(|row| row.remark.is_none()), "{:?}", prediction.0[0].remark);
     let compliance = parameters.0.iter_mut().filter(|row| row.effect == "joint_compliance");
     compliance.for_each(|row| row.value = 3e-6);
     let (_, warnings) = carry(&parameters);
@@ -383,21 +379,6 @@ fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_t
 }
 
 #[test]
-fn remarks_of_a_carried_model_name_no_variable_that_nothing_in_it_depends_on() {
-    let mut carrying = Carrying::new();
-    carrying.here.temperature = Some(vec![20.0; carrying.here.rows()]);
-    carrying.here.payload = Some(vec![0.0; carrying.here.rows()]);
-    carrying.there.0.temperature = Some(vec![35.0; carrying.there.0.rows()]);
-    carrying.there.0.payload = Some(vec![1.0; carrying.there.0.rows()]);
-    let remarks =
-        |carried: &CarriedThere| carried.prediction.0.iter().filter_map(|row| row.remark.clone()).collect::<Vec<_>>().join("\n");
-    let said = remarks(&carrying.carry(&carrying.geometry.0, false));
-    assert!(said.is_empty(), "{said}");
-    let said = remarks(&carrying.carry(&carrying.found.0, true));
-    assert!(!said.contains("temperature") && said.contains("payload"), "{said}");
-}
-
-#[test]
 fn the_closing_lines_state_the_carried_figure() {
     let folder = tempfile::tempdir().expect("a folder");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
@@ -430,6 +411,6 @@ fn the_closing_lines_state_the_carried_figure() {
     let told = String::from_utf8_lossy(&run.stdout);
     assert!(run.status.success(), "{told}{}", String::from_utf8_lossy(&run.stderr));
     let carried = told.lines().find(|line| line.starts_with("carried")).unwrap_or_default();
-    assert!(carried.contains("after `carried`") && carried.contains("30 held-out points"), "{told}");
-    assert!(!told.contains("after `found`"), "{told}");
+    assert!(carried.contains("step carried, ") && carried.contains("30 held-out points"), "{told}");
+    assert!(!told.contains("step found"), "{told}");
 }

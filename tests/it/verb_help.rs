@@ -14,7 +14,12 @@ fn help(verb: &[String]) -> String {
 /// Every verb and verb of a verb, by its words.
 fn verbs(above: &[String]) -> Vec<Vec<String>> {
     let text = help(above);
-    let list = text.split("\nCommands:\n").nth(1).map(|rest| rest.split("\n\n").next().unwrap_or_default()).unwrap_or_default();
+    // The verbs of calib itself stand in groups, before its options.
+    let list = match above {
+        [] => text.split("\nOptions:\n").next(),
+        _ => text.split("\nCommands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()),
+    };
+    let list = list.unwrap_or_default();
     let names = list
         .lines()
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
@@ -65,4 +70,21 @@ fn every_setting_that_a_help_shows_is_one_of_a_shipped_pipeline() {
     let refused: Vec<&String> = shown.iter().filter(|set| !taken(&pipelines, set)).collect();
     assert!(refused.is_empty(), "no shipped pipeline takes {refused:?}");
     assert!(!taken(&pipelines, "split.every=5"), "what is no setting is seen as none");
+}
+
+#[test]
+fn the_help_has_every_verb_in_a_group_within_a_hundred_columns() {
+    let text = help(&[]);
+    for group in [
+        "Calibrate a robot:",
+        "Look at what was computed:",
+        "Plan a measurement:",
+        "Many robots:",
+        "Keep the store:",
+        "Laboratory:",
+    ] {
+        assert!(text.lines().any(|line| line == group), "{group} in\n{text}");
+    }
+    let wide: Vec<&str> = text.lines().filter(|line| line.starts_with("  ") && line.len() > 100).collect();
+    assert!(wide.is_empty(), "{wide:?}");
 }

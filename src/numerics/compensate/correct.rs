@@ -134,7 +134,7 @@ pub struct CorrectionTotals {
     pub beyond_limits: u64,
     /// Targets beyond what was measured.
     pub beyond_measured: u64,
-    /// Targets whose correction is uncertain, or uses a finding beyond what was fitted.
+    /// Targets whose correction is uncertain by more than half of itself.
     pub uncertain: u64,
 }
 
@@ -158,12 +158,7 @@ impl CorrectionTotals {
             (self.insisted, "is", "are", "beyond the limits of corrections and written because of --force"),
             (self.turned, "is", "are", "reached in position but not in orientation: the wrist is singular there"),
             (self.beyond_limits, "leaves", "leave", "the joint limits"),
-            (
-                self.uncertain,
-                "has",
-                "have",
-                "a correction that is uncertain by more than half, or uses a finding beyond what was fitted",
-            ),
+            (self.uncertain, "has", "have", "a correction that is uncertain by more than half of itself"),
             (self.beyond_measured, "is", "are", "outside of what was measured: the model extrapolates there"),
         ];
         let said = all.into_iter().filter(|(count, ..)| *count > 0);
@@ -301,7 +296,8 @@ impl<'a> Corrector<'a> {
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
-            remarks.extend(certainty.iter().flat_map(Remark::of_certainty));
+            remarks.extend(certainty.iter().filter_map(Remark::of_certainty));
+            remarks.extend(certainty.iter().flat_map(Remark::beyond));
             let open = Some(&self.by_what_is_not_stated).filter(|findings| !findings.is_empty());
             remarks.extend(open.cloned().map(Remark::NotStated));
             let share = reach.share();
@@ -359,8 +355,8 @@ impl CorrectionTotals {
         self.not_reached += u64::from(answer.q.is_none()) - refused;
         self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
-        self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..) | Remark::BeyondFitted(..)));
-        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
+        self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..)));
+        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_) | Remark::BeyondFitted(..)));
     }
 }
 

@@ -10,12 +10,16 @@ use nalgebra::Vector3;
 const COVERAGE: f64 = 1.96;
 /// Recorded poses at which the usual uncertainty is asked, at most.
 const POSES: usize = 60;
-/// A law may be this share of its range beyond it without a word.
-const SLACK: f64 = 0.02;
+/// m: a smaller correction is rounding and has no direction.
+const NOTHING: f64 = 1e-9;
 /// A finding is named where it makes at least this share of the whole by itself.
 const NAMED: f64 = 0.5;
-/// Below so many times what is usual where the arm was measured, an uncertainty is of no account, however small the correction.
-const USUAL: f64 = 3.0;
+/// A correction is doubtful from this share of itself on ...
+const DOUBTFUL: f64 = 0.5;
+/// ... and above so many standard deviations of the instrument.
+const SEEN: f64 = 3.0;
+/// Below so many times what is usual where the arm was measured, an uncertainty refuses nothing, however small the correction.
+const USUAL: f64 = 6.0;
 
 /// How far a correction may be off along its own direction.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,21 +30,23 @@ pub struct CorrectionUncertainty {
     pub u95: f64,
     /// The effect and place that most of it comes from, where one stands out.
     pub finding: Option<String>,
-    /// Findings that are used beyond what was fitted, and over what.
+    /// Findings that are used beyond what was fitted and may be off there by more than the instrument leaves open, and over what.
     pub beyond: Vec<(String, String)>,
     /// m, 95 %: what is usual at the recorded poses; 0 where they are not known.
     pub usual: f64,
+    /// m: length of one standard deviation of the instrument at the recorded poses; 0 where they are not known.
+    pub instrument: f64,
 }
 
 impl CorrectionUncertainty {
-    /// Whether it is above half of the correction, and above what is usual.
-    pub fn is_remarkable(&self) -> bool {
-        self.u95.is_nan() || self.u95 > (0.5 * self.correction).max(USUAL * self.usual)
+    /// Whether the correction is doubtful: uncertain by more than half of itself, and by more than the instrument leaves open.
+    pub fn is_doubtful(&self) -> bool {
+        self.u95.is_nan() || self.u95 > (DOUBTFUL * self.correction).max(SEEN * self.instrument)
     }
 
     /// Above this (m) the correction may do more harm than good.
     pub fn limit(&self) -> f64 {
-        self.correction.max(2.0 * USUAL * self.usual)
+        self.correction.max(USUAL * self.usual)
     }
 }
 
@@ -55,24 +61,57 @@ impl Uncertainty {
         if all.is_empty() { 0.0 } else { median(all) }
     }
 
+    /// Length (m) of one standard deviation of the instrument, rms over the rows of a recording.
+    pub(super) fn instrument(data: &Measurements) -> f64 {
+        let rows = data.rows();
+        let squares: f64 = (0..rows).map(|row| data.noise(row).powi(2)).filter(|square| square.is_finite()).sum();
+        (squares / rows.max(1) as f64).sqrt()
+    }
+
     /// How certain the correction (m, tracker frame) is that brought the command to `q`, under the circumstances that `reach` is set to.
     pub fn of_correction(&self, reach: &mut Reach, q: &[f64], correction: &Vector3<f64>) -> CorrectionUncertainty {
-        let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q).into_iter().filter(|one| one.share > SLACK).collect();
+        let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q);
         let size = correction.norm();
-        let along = if size > 0.0 { correction / size } else { Vector3::zeros() };
+        let along = if size > NOTHING { correction / size } else { Vector3::zeros() };
         let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
         let jacobian = self.along(reach, q, &along);
         let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
-        let named: Vec<(String, String)> =
-            beyond.iter().map(|one| (self.name(one.parameters.start), one.variable.to_string())).collect();
+        let seen = |one: &&BeyondFitted| COVERAGE * one.share * one.displacement.norm() > self.instrument;
+        let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
-        if u95 > 0.5 * size {
+        if u95 > DOUBTFUL * size {
             let mut shares = self.by_effect(&jacobian);
-            shares.extend(beyond.iter().zip(&named).map(|(one, (name, _))| (name.clone(), by_range(one))));
+            shares.extend(beyond.iter().map(|one| (self.name(one.parameters.start), by_range(one))));
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
         }
-        CorrectionUncertainty { correction: size, u95, finding, beyond: named, usual: self.usual }
+        CorrectionUncertainty {
+            correction: size,
+            u95,
+            finding,
+            beyond: beyond.iter().filter(seen).map(named).collect(),
+            usual: self.usual,
+            instrument: self.instrument,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_correction_is_doubtful_above_half_of_itself_and_three_times_the_instrument() {
+        let um = |correction: f64, u95: f64| CorrectionUncertainty {
+            correction: correction * 1e-6,
+            u95: u95 * 1e-6,
+            finding: None,
+            beyond: Vec::new(),
+            usual: 400e-6,
+            instrument: 18e-6,
+        };
+        let doubtful = [(1000.0, 600.0), (1000.0, 400.0), (20.0, 53.0), (20.0, 55.0)].map(|(c, u)| um(c, u).is_doubtful());
+        assert_eq!(doubtful, [true, false, false, true]);
     }
 }

@@ -1,12 +1,11 @@
-//! What measured rows are not to be predicted by a model without a word: corrections that it is uncertain of, and findings beyond what was
-//! fitted. A row is asked as a target at its joints would be.
+//! Where measured rows are predicted with doubt: corrections that the model is uncertain of. A row is asked as a target at its joints would be.
 
 use super::{Chain, Circumstance, IdentifiedArm, Nominal, Remark, Uncertainty};
 use crate::robot::Measurements;
 use rayon::prelude::*;
 
-/// Remarks for each of `rows`, in their order; empty where the model holds.
-pub fn doubts(arm: &IdentifiedArm, uncertainty: &Uncertainty, data: &Measurements, rows: &[usize]) -> Vec<Vec<Remark>> {
+/// A remark for each of `rows`, in their order; none where the model holds.
+pub fn doubts(arm: &IdentifiedArm, uncertainty: &Uncertainty, data: &Measurements, rows: &[usize]) -> Vec<Option<Remark>> {
     let asked = rows.par_iter().map_init(
         || (arm.reach(), Nominal::new(&arm.model().robot)),
         |(reach, nominal), row| {

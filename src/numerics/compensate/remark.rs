@@ -32,11 +32,15 @@ pub enum Remark {
 }
 
 impl Remark {
-    /// What is to be said of how certain a correction is.
-    pub(super) fn of_certainty(certainty: &CorrectionUncertainty) -> Vec<Self> {
+    /// That a correction is doubtful, where it is.
+    pub(super) fn of_certainty(certainty: &CorrectionUncertainty) -> Option<Self> {
         let uncertain = || Self::Uncertain(certainty.correction, certainty.u95, certainty.finding.clone());
-        let beyond = certainty.beyond.iter().map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()));
-        certainty.is_remarkable().then(uncertain).into_iter().chain(beyond).collect()
+        certainty.is_doubtful().then(uncertain)
+    }
+
+    /// Which findings a target uses beyond what was fitted.
+    pub(super) fn beyond(certainty: &CorrectionUncertainty) -> impl Iterator<Item = Self> {
+        certainty.beyond.iter().map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()))
     }
 }
 

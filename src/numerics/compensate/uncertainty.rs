@@ -43,6 +43,8 @@ pub struct Uncertainty {
     names: Vec<String>,
     /// m, 95 %: what is usual at the recorded poses.
     pub(super) usual: f64,
+    /// m: length of one standard deviation of the instrument there.
+    pub(super) instrument: f64,
 }
 
 impl Uncertainty {
@@ -64,12 +66,13 @@ impl Uncertainty {
                 }
             }
         }
-        Self { covariance, scatter, row, sources, names, usual: 0.0 }
+        Self { covariance, scatter, row, sources, names, usual: 0.0, instrument: 0.0 }
     }
 
-    /// The same, beside what is usual at the poses of a recording.
+    /// The same, beside what is usual at the poses of a recording and what its instrument leaves open.
     pub fn beside(mut self, arm: &IdentifiedArm, data: &Measurements) -> Self {
         self.usual = self.usual(arm, data);
+        self.instrument = Self::instrument(data);
         self
     }
 

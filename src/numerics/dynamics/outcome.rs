@@ -141,8 +141,9 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
 fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
     let sentence = |(number, gain): &(usize, f64)| {
         let form = choice.form(*number);
+        let squares = if *gain < 0.0 { format!("grows by {:.1}", -gain) } else { format!("falls by {gain:.1} only") };
         format!(
-            "{} at {}: held-out rows do not confirm it (their squared error changes by {gain:.1})",
+            "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
             form.cause.name(),
             form.place
         )
@@ -156,8 +157,7 @@ fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftove
     let of = |(joint, course): (usize, &Vec<f64>)| {
         let noise = JointNoise::of(course, &runs, 0.0);
         let lasting = noise.autocorrelation();
-        let signature =
-            (lasting > LASTING).then(|| format!("joint {}: it lasts over {lasting:.0} rows: no white noise", joint + 1));
+        let signature = (lasting > LASTING).then(|| format!("correlated over {lasting:.0} rows: not white noise"));
         TorqueLeftover { rms: noise.sigma, over_noise: noise.sigma / problem.noise[joint].sigma, signature }
     };
     residual.iter().enumerate().map(of).collect()

@@ -3,6 +3,7 @@
 mod in_short;
 
 use super::own_effect::declared_in_yaml;
+use super::robot_of;
 use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::StageReport;
@@ -27,6 +28,10 @@ pub struct DiagnosisSummary {
     shares: Shares,
     forms: Forms,
     suspects: Suspects,
+    /// Its name.
+    robot: Option<String>,
+    /// Rows of the recording.
+    rows: u64,
 }
 
 /// Rivals of a finding that poses are offered for.
@@ -102,6 +107,8 @@ impl DiagnosisSummary {
             shares: table(stage, store)?,
             forms: table(stage, store)?,
             suspects: table(stage, store)?,
+            robot: robot_of(stage, store)?,
+            rows: stage.inputs.iter().find(|input| input.port == "recording").map_or(0, |input| input.table.rows),
         })
     }
 
@@ -200,10 +207,16 @@ impl DiagnosisSummary {
         self.suspects.0.iter().filter(|row| !row.used)
     }
 
-    /// How many rows are not fitted, and the worst of them by name.
-    fn set_aside(&self) -> Option<String> {
+    /// The same, the worst first.
+    fn worst_aside(&self) -> Vec<&SuspectsRow> {
         let mut all: Vec<&SuspectsRow> = self.aside().collect();
         all.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
+        all
+    }
+
+    /// How many rows are not fitted, and the worst of them by name.
+    fn set_aside(&self) -> Option<String> {
+        let all = self.worst_aside();
         let named: Vec<String> =
             all.iter().take(ASIDE).map(|row| format!("{} of set {} {:.3} mm off", row.point_id, row.set, row.size_mm)).collect();
         let more = if all.len() > ASIDE { ", the worst of them" } else { "" };

@@ -1,5 +1,5 @@
-//! Findings beyond the rows that they were fitted to: held-out points there are counted and named, targets have a remark, none is harmed in
-//! silence.
+//! One rule of doubt: a held-out point has a remark where its correction is uncertain by more than half of itself and by more than the
+//! instrument leaves open; such points are counted and named. A small finding beyond its range is none, and harms no target in silence.
 
 use super::concealed::{Outcome, again, is_harmed, nothing, outcomes_at, recording, split, targets, upright};
 use crate::desk::{Desk, table};
@@ -30,7 +30,7 @@ fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
     (table::<Verdict>(&tables).remove(0), prediction, held_out)
 }
 
-/// Every remark of a held-out row, and that table, figures and verdict count alike.
+/// Every remark of a held-out row; table, figures and verdict count alike.
 fn counted(case: &Case) -> Vec<Option<String>> {
     let (verdict, prediction, held_out) = judged(case);
     let remarks: Vec<Option<String>> = prediction.0.iter().filter(|row| row.held_out).map(|row| row.remark.clone()).collect();
@@ -39,7 +39,7 @@ fn counted(case: &Case) -> Vec<Option<String>> {
     let statement = verdict.0[0].statement.clone().expect("a statement");
     println!("{statement}\n{:?}", held_out.doubts());
     assert_eq!(remarked > 0, held_out.doubts().is_some());
-    assert_eq!(remarked > 0, statement.contains("held-out points have a remark"), "{statement}");
+    assert_eq!(remarked > 0, statement.contains("uncertain by more than half of itself"), "{statement}");
     remarks
 }
 
@@ -53,7 +53,7 @@ fn unharmed(case: &Case) -> Vec<Outcome> {
 }
 
 #[test]
-fn a_zero_that_wanders_in_time_is_said_to_be_unknown_later() {
+fn a_zero_that_wanders_leaves_larger_corrections_without_doubt_later() {
     let case = nothing(41, false);
     let last = case.shots.last().expect("rows").time_s;
     let course = ForeignCourse {
@@ -63,12 +63,9 @@ fn a_zero_that_wanders_in_time_is_said_to_be_unknown_later() {
     };
     let wanders = Foreign { motion: ForeignMotion::JointTurn, seat: 2, direction: [0.0; 3], size: 60.0, courses: vec![course] };
     let case = again(case, vec![Physical::Foreign(wanders)], 41, |shot| shot.q.clone());
+    // 60 arcsec at a lever of a metre are 0.3 mm, of corrections of some mm.
     let remarks = counted(&case);
-    let over_time =
-        |remark: &Option<String>| remark.as_ref().is_some_and(|said| said.contains("beyond the") && said.contains("time"));
-    // The first follow the last fitted one by less than a fiftieth of the recording.
-    let (soon, later) = remarks.split_at(remarks.len() / 10);
-    assert!(later.iter().all(over_time) && soon.iter().filter(|remark| over_time(remark)).count() < 8, "{remarks:?}");
+    assert!(remarks.iter().all(Option::is_none), "{remarks:?}");
     unharmed(&case);
 }
 
@@ -82,7 +79,7 @@ fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
 }
 
 #[test]
-fn loads_on_one_side_say_nothing_of_the_other_without_a_word() {
+fn loads_on_the_other_side_than_was_fitted_harm_no_target() {
     let case = nothing(43, false);
     let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
     let arm = Arm::new(&case.robot, &case.truth);
@@ -101,8 +98,6 @@ fn loads_on_one_side_say_nothing_of_the_other_without_a_word() {
         Physical::JointHardening(JointHardening { joint: 2, curve: Curve::Tanh, amplitude_arcsec: 80.0, scale_nm: 12.0 }),
     ];
     let case = again(case.clone(), effects, 43, lean);
-    let remarks = counted(&case);
-    // Held-out rows lean the other way: joint 2, whose load that is, has been there in none.
-    assert!(remarks.iter().all(|remark| remark.as_ref().is_some_and(|said| said.contains("joint 2"))), "{remarks:?}");
+    counted(&case);
     unharmed(&case);
 }

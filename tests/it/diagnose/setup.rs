@@ -320,7 +320,7 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     case_with(here, &[]);
     let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
     assert_eq!(code, Some(10), "{told}");
-    assert!(told.contains("not accepted: the set-up is wrong: the points are in inches"), "{told}");
+    assert!(told.contains("verdict   wrong set-up") && told.contains("the points are in inches"), "{told}");
     assert!(!told.lines().any(|line| line.starts_with("after")), "{told}");
     let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
     assert!(code == Some(10) && said.contains("the set-up is wrong: the points are in inches"), "{code:?} {said}");

@@ -29,6 +29,7 @@ impl TorqueCause for Asymmetric {
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        format!("friction of {} is {:.3} Nm greater in its positive direction", form.place, fitted[0].value)
+        let (size, side) = (fitted[0].value.abs(), if fitted[0].value < 0.0 { "negative" } else { "positive" });
+        format!("friction of {} is {size:.3} Nm greater in its {side} direction", form.place)
     }
 }

@@ -50,7 +50,8 @@ impl TorqueCause for Offset {
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
-        let constant = format!("the torque of {} reads {:.3} Nm too much, whatever it does", form.place, fitted[0].value);
+        let (size, how) = (fitted[0].value.abs(), if fitted[0].value < 0.0 { "little" } else { "much" });
+        let constant = format!("the torque of {} reads {size:.3} Nm too {how}, whatever it does", form.place);
         match fitted.get(1) {
             None => constant,
             Some(cold) => {
