@@ -2,7 +2,7 @@
 """What `calib diagnose` says of many recordings with known answers, kept as tables, so that two versions can be held against each other.
 
     python3 -m pip install pyarrow
-    python3 tests/reference/oracle.py BINARY OUT [--sets practice concealed ...] [--repo DIR] [--practice DIR] [--maker BINARY] [--jobs 1] [--nice]
+    python3 tests/reference/oracle.py BINARY OUT [--sets practice concealed ...] [--repo DIR] [--maker BINARY] [--jobs 1] [--nice]
     python3 tests/reference/oracle.py --compare A B [--sets ...]
     calib diff A/cases.parquet B/cases.parquet --key set,case --ignore cpu_s
     calib diff A/findings.parquet B/findings.parquet --key set,case,effect,place,number
@@ -11,25 +11,22 @@ BINARY diagnoses every recording with the pipelines of the checkout DIR (that of
 own with one worker thread. OUT holds findings.parquet (a row a finding), cases.parquet (a row a recording) and answers/SET/CASE.json, what the
 program printed. Given again after an interruption, it goes on; answers of another binary are refused.
 
-practice          folders with want.json: ../shared/practice beside the checkout, or --practice
-practice_torques  the same of moving arms, in practice_dynamics beside those
+practice          folders with want.json in ../shared/practice beside the checkout; practice_torques: of moving arms, in ../shared/practice_dynamics
 concealed         60 recordings of `calib simulate conceal`: a quarter without any effect, a fifth with two, half of the effects in other forms
 foreign, torques  40 with effects of no list (`--foreign 1`); 60 of moving arms (`--dynamics`), a quarter without any, a fifth with two
 first             pipelines/sr210d, the whole run; its true effects are those of the pipeline
 ur5               pipelines/ur5 with its data where the pipeline says: real, so that nothing is marked
 sockets           pipelines/sockets with a stage `diagnose` in it: its joints give, which may be named and need not
 
-Recordings are made once, by BINARY or --maker, in the folder `cases` beside OUT, from a fixed seed: they are for development, acceptance needs
-fresh ones. Marks:
+Recordings are made once, by BINARY or --maker, in the folder `cases` beside OUT, from a fixed seed: acceptance needs fresh ones. Marks:
 
 want.json      a finding is wanted where its name and place are asked for (`a|b`: either; a leading `?`: true, not required), else false. A drifting
                tracker and a moving base are one; runs of links agree where they overlap.
 sealed truths  as `calib simulate reveal` marks: a finding is `rival` where only a rival of it is true; a cause is required from L = 50 on
 wrong          a name other than `unknown` that is not there: of a false finding, or of the first choice at a true place
 exact          every required cause is named, and no finding is false
-ratio          held-out rms over the noise: the true one of sealed truths, with what no model can know of foreign effects; else the stated one. Of
-               torques the nrmse after over before
-cpu_s          user and system time of the child; of `first` that of the run
+ratio          held-out rms over the true noise, with what no model can know of foreign effects; else over the stated one; of torques nrmse after over before
+cpu_s          user and system time of the process
 """
 import argparse
 import collections
@@ -53,20 +50,18 @@ SEED = 50
 CONCEALED = {
     "concealed": ["--cases", 60, "--nulls", 0.25, "--pairs", 0.2],
     "foreign": ["--cases", 40, "--foreign", 1],
-    "torques": ["--cases", 60, "--nulls", 0.25, "--pairs", 0.2, "--dynamics"],
-}
+    "torques": ["--cases", 60, "--nulls", 0.25, "--pairs", 0.2, "--dynamics"]}
 PRACTICE = {"practice": "practice", "practice_torques": "practice_dynamics"}
 PIPELINES = {"practice": "case", "concealed": "case", "foreign": "case", "practice_torques": "dynamics", "torques": "dynamics", "first": "sr210d"}
-SETS = ["practice", "practice_torques", *CONCEALED, "first", "ur5", "sockets"]
 # What the twins of two pipelines have, in the words of want.json: gaps, run-outs of motors and meshes under load are true, and not required.
 TWINS = {
     "first": {
         "joint_compliance|joint_hardening": [2, 3, 4, 5], "gear_cyclic": [1, 2, 3, 4, 5], "base_compliance": ["base"], "link_compliance": ["link 2", "link 4"],
         "?backlash": range(1, 7), "?gear_load": [2, 3], "?gear_motor_cyclic": [2, 3, 6]},
-    "sockets": {"?joint_compliance|joint_hardening": [2, 3, 4, 5, 6]}}
+    "ur5": {}, "sockets": {"?joint_compliance|joint_hardening": [2, 3, 4, 5, 6]}}
+SETS = ["practice", "practice_torques", *CONCEALED, *TWINS]
 INSTRUMENT = {"tracker_drift", "base_shift", "frame_shift", "tracker_shift", "unknown"}
-DUE = 50.0
-CPU_LIMIT_S = 1800
+DUE, CPU_LIMIT_S = 50.0, 1800
 
 TEXT, REAL, WHOLE, TRUTH = pa.string(), pa.float64(), pa.int64(), pa.bool_()
 FINDINGS = pa.schema([
@@ -81,29 +76,24 @@ CASES = pa.schema([
 
 # ---- the recordings: (set, case, folder, answer)
 
-def practice(which, arguments):
-    folder = arguments.practice.with_name(PRACTICE[which]) if which != "practice" else arguments.practice
-    if not folder.is_dir():
-        raise SystemExit(f"{which}: {folder} is missing; --practice names the folder, --sets leaves the set out")
-    for case in sorted(path.parent for path in folder.glob("*/want.json")):
-        yield which, case.name, case, ("want", json.loads((case / "want.json").read_text())["effects"])
-
-
-def concealed(which, arguments):
-    folder = arguments.out.parent / "cases" / f"{which}-{arguments.seed}"
-    if not (folder / "seal.json").exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        command = [arguments.maker, "simulate", "conceal", "--out", folder, "--seed", arguments.seed, *CONCEALED[which]]
-        subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
-    for case in sorted((folder / "recordings").iterdir()):
-        yield which, case.name, case, ("sealed", json.loads((folder / "sealed" / f"{case.name}.json").read_text()))
-
-
 def jobs(which, arguments):
-    if which in PRACTICE or which in CONCEALED:
-        return (practice if which in PRACTICE else concealed)(which, arguments)
-    want = [{"effect": effect, "where": f"joint {at}" if isinstance(at, int) else at} for effect, places in TWINS.get(which, {}).items() for at in places]
-    return [(which, which, None, ("want", want) if want else ("none", None))]
+    if which in TWINS:
+        want = [{"effect": effect, "where": f"joint {at}" if isinstance(at, int) else at} for effect, places in TWINS[which].items() for at in places]
+        yield which, which, None, ("want", want) if want else ("none", None)
+    elif which in PRACTICE:
+        folder = arguments.repo.parent / "shared" / PRACTICE[which]
+        if not folder.is_dir():
+            raise SystemExit(f"{which}: {folder} is missing; --sets names the sets that are wanted")
+        for case in sorted(path.parent for path in folder.glob("*/want.json")):
+            yield which, case.name, case, ("want", json.loads((case / "want.json").read_text())["effects"])
+    else:
+        folder = arguments.out.parent / "cases" / f"{which}-{arguments.seed}"
+        if not (folder / "seal.json").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            command = [arguments.maker, "simulate", "conceal", "--out", folder, "--seed", arguments.seed, *CONCEALED[which]]
+            subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+        for case in sorted((folder / "recordings").iterdir()):
+            yield which, case.name, case, ("sealed", json.loads((folder / "sealed" / f"{case.name}.json").read_text()))
 
 
 # ---- one diagnosis
@@ -138,9 +128,8 @@ def diagnosed(job, arguments):
             pipeline = folder / which / "pipeline.yaml"
             pipeline.write_text(pipeline.read_text().replace("  - uses: validate\n", "  - uses: diagnose\n\n  - uses: validate\n"))
         store = ["--store", folder / "store", "--json", "--quiet"]
-        which_case = ["--set", f"case={recording}"] if recording else []
-        verb = "run" if which == "first" else "diagnose"
-        code, out, err, cpu = child([arguments.binary, verb, pipeline, *which_case, *store, "--jobs", 1], arguments.repo, folder)
+        words = ["run" if which == "first" else "diagnose", pipeline, *(["--set", f"case={recording}"] if recording else [])]
+        code, out, err, cpu = child([arguments.binary, *words, *store, "--jobs", 1], arguments.repo, folder)
         if which == "first" and code in (0, 1):
             code, out, err, _ = child([arguments.binary, "diagnose", "HEAD", *store], arguments.repo, folder)
         tables = list((folder / "store").glob("tables/*/diagnose*.parameters.parquet"))
@@ -198,13 +187,13 @@ def marked_by_truth(truth, findings):
     if truth["tampered"]:
         known |= {("outlier", "recording"), ("mislabelled_point", "recording")}
     wanted = [cause for cause in effects if cause.get("wanted", True)]
-    places = {place for _, place in names(wanted) | accepted} if wanted else set()
+    places = {place for _, place in names(wanted) | accepted}
     marks = []
     for finding in findings:
         own = names([finding])
         mark = "wanted" if own & known else "rival" if reach(finding) & known else "false"
-        at_true_place = any(place in places for _, place in own)
-        marks.append((mark, mark != "wanted" and finding["effect"] != "unknown" and (mark == "false" or at_true_place)))
+        wrong = mark == "false" or (mark == "rival" and any(place in places for _, place in own))
+        marks.append((mark, wrong and finding["effect"] != "unknown"))
     causes = []
     for cause in wanted:
         own, equal = names([cause]), names(cause.get("same") or [])
@@ -213,26 +202,23 @@ def marked_by_truth(truth, findings):
     return marks, causes
 
 
-# ---- rows of the tables
-
 def rows_of(job, said):
     which, case, _, (kind, truth) = job
     a = said["answer"] or {}
     findings = a.get("findings", [])
     marks, causes = {"want": marked_by_want, "sealed": marked_by_truth, "none": lambda _, f: ([(None, None)] * len(f), [])}[kind](truth, findings)
-    rows, often = [], collections.Counter()
+    rows = []
     for rank, (finding, (mark, wrong)) in enumerate(zip(findings, marks), 1):
-        often[name(finding)] += 1
+        number = [name(other) for other in findings[:rank]].count(name(finding))
         evidence = finding.get("evidence") or {}
         size = evidence.get("effect_rms_mm")
         rivals = sorted(finding.get("rivals") or [], key=lambda rival: -(rival.get("probability") or 0))
         rows.append({
-            "set": which, "case": case, "effect": finding["effect"], "place": finding["where"], "number": often[name(finding)], "rank": rank, "mark": mark,
-            "wrong": wrong, "size_um": None if size is None else 1e3 * size, "size_nm": evidence.get("effect_rms_nm"), "probability": finding.get("probability"),
-            "place_probability": finding.get("place_probability"), "none_probability": finding.get("none_probability"),
-            "parameters": len(finding.get("parameters") or []), "rivals": "; ".join(f"{'@'.join(name(rival))} {rival.get('probability') or 0:.2f}" for rival in rivals[:6])})
+            "set": which, "case": case, "effect": finding["effect"], "place": finding["where"], "number": number, "rank": rank,
+            "mark": mark, "wrong": wrong, "size_um": None if size is None else 1e3 * size, "size_nm": evidence.get("effect_rms_nm"),
+            **{key: finding.get(key) for key in ("probability", "place_probability", "none_probability")}, "parameters": len(finding.get("parameters") or []),
+            "rivals": "; ".join(f"{'@'.join(name(rival))} {rival.get('probability') or 0:.2f}" for rival in rivals[:6])})
     due = [outcome for _, required, outcome in causes if required]
-    judged, false = kind != "none", sum(row["mark"] == "false" for row in rows)
     row = {key: (a.get(when) or {}).get(f"validate_{key.split('_', 1)[1]}") for when in ("before", "after") for key in CASES.names if key.startswith(when)}
     floor = a.get("noise_floor_mm")
     noise = truth.get("noise") if kind == "sealed" else None
@@ -242,11 +228,12 @@ def rows_of(job, said):
         "set": which, "case": case, "content": truth["content"] if kind == "sealed" else "null" if which in PRACTICE and not due else "",
         "wanted": "; ".join(text if required else f"[{text}]" for text, required, _ in causes),
         "missed": "; ".join(text for text, required, outcome in causes if required and outcome != "named"),
-        "exact": (not said["fault"] and not false and all(outcome == "named" for outcome in due)) if judged else None,
-        "required": len(due) if judged else None, "named": due.count("named") if judged else None, "as_rival": due.count("rival") if judged else None,
-        "wrong": sum(bool(row["wrong"]) for row in rows) if judged else None, "false": false if judged else None, "verdict": a.get("verdict"),
-        "noise_floor_mm": floor, "ratio": over[0] / over[1] if over[0] is not None and over[1] else None, "parameters": said["parameters"],
+        "verdict": a.get("verdict"), "noise_floor_mm": floor, "ratio": over[0] / over[1] if over[0] is not None and over[1] else None, "parameters": said["parameters"],
         "parameters_of_findings": sum(row["parameters"] for row in rows), "cpu_s": said["cpu_s"], "fault": said["fault"]}
+    if kind != "none":
+        row |= {"required": len(due), "named": due.count("named"), "as_rival": due.count("rival")}
+        row |= {"wrong": sum(row["wrong"] for row in rows), "false": sum(row["mark"] == "false" for row in rows)}
+        row |= {"exact": not said["fault"] and not row["false"] and row["named"] == row["required"]}
     return row, rows
 
 
@@ -263,8 +250,9 @@ def run(arguments):
             case, rows = rows_of(job, said)
             cases, findings = [*cases, case], [*findings, *rows]
             print("\n".join(told(case, rows, f"{case['set']} {case['case']}")), flush=True)
-    for title, rows, schema in (("cases", cases, CASES), ("findings", findings, FINDINGS)):
-        pq.write_table(pa.Table.from_pylist(rows, schema), arguments.out / f"{title}.parquet")
+    for path, rows, schema in ((arguments.out / "cases.parquet", cases, CASES), (arguments.out / "findings.parquet", findings, FINDINGS)):
+        others = [row for row in pq.read_table(path).to_pylist() if row["set"] not in arguments.sets] if path.exists() else []
+        pq.write_table(pa.Table.from_pylist(others + rows, schema), path)
     print("\n" + table([(arguments.out.name, cases)]))
 
 
@@ -274,9 +262,8 @@ def told(case, rows, title):
     grade = {True: "exact", False: "-", None: "not judged"}[case["exact"]]
     held = "" if case["ratio"] is None else f", held out {case['ratio']:.3f} of " + ("before" if case["after_nrmse"] is not None else "the noise")
     mean = "" if case["after_mean_mm"] is None else f", mean {case['after_mean_mm']:.4f} max {case['after_max_mm']:.4f} mm"
-    out = [f"{title}: {grade}, {case['verdict'] or 'failed: ' + case['fault']}{held}{mean}, {case['parameters']} parameters, {case['cpu_s']:.1f} s"]
-    if case["exact"] is False:
-        out.append(f"    wanted {case['wanted'] or 'nothing'}")
+    wanted = [f"    wanted {case['wanted'] or 'nothing'}"] if case["exact"] is False else []
+    out = [f"{title}: {grade}, {case['verdict'] or 'failed: ' + case['fault']}{held}{mean}, {case['parameters']} parameters, {case['cpu_s']:.1f} s", *wanted]
     for row in rows:
         size = f"{row['size_um']:.0f} um" if row["size_um"] is not None else "-" if row["size_nm"] is None else f"{row['size_nm']:.3g} Nm"
         mark = "" if row["mark"] is None else row["mark"] + (", wrong" if row["wrong"] else "")
@@ -287,7 +274,9 @@ def told(case, rows, title):
 def table(versions):
     """A line a set and version; the last column of the second: its held-out errors over those of the first. Means of ratios are geometric."""
     geometric = lambda values: f"{math.exp(sum(map(math.log, values)) / len(values)):.3f}" if values else "-"
-    lines = [f"{'set':17}{'':12}{'exact':>8}{'named/wanted':>14}{'wrong':>7}{'false':>7}{'nulls':>8}{'ratio':>8}{'CPU s':>9}{'failed':>8}{'held-out error':>16}"]
+    widths, heads = (8, 14, 7, 7, 8, 8, 9, 8, 14), ["exact", "named/wanted", "wrong", "false", "nulls", "ratio", "CPU s", "failed", "held out B/A"]
+    line = lambda which, label, cells: f"{which:17}{label[:13]:14}" + "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths))
+    lines = [line("set", "", heads)]
     sets = [which for which in SETS if any(case["set"] == which for _, cases in versions for case in cases)]
     for which in [*sets, None]:
         first = None
@@ -302,8 +291,8 @@ def table(versions):
             ratio = geometric([case["ratio"] for case in own.values() if case["ratio"]])
             cells = [f"{total('exact')}/{len(judged)}", f"{total('named')}/{total('required')}", total("wrong"), total("false")]
             cells += [f"{sum(case['false'] > 0 for case in nulls)}/{len(nulls)}", ratio, f"{sum(case['cpu_s'] for case in own.values()):.1f}"]
-            cells += [sum(case["fault"] is not None for case in own.values()), f"x {geometric(over)}" if over else ""]
-            lines.append(f"{which or 'all':17}{label[:11]:12}" + "".join(f"{cell:>{width}}" for cell, width in zip(cells, (8, 14, 7, 7, 8, 8, 9, 8, 16))))
+            cells += [sum(case["fault"] is not None for case in own.values()), geometric(over) if over else ""]
+            lines.append(line(which or "all", label, cells))
     return "\n".join(lines)
 
 
@@ -316,18 +305,20 @@ def compare(arguments):
             by_case[row["set"], row["case"]].append(row)
         versions.append({(case["set"], case["case"]): case for case in read("cases")})
         findings.append(by_case)
-    labels = [folder.name for folder in arguments.compare] if len({folder.name for folder in arguments.compare}) == 2 else ["A", "B"]
+    labels = [f"{letter} {folder.resolve().name}" for letter, folder in zip("AB", arguments.compare)]
     common = [key for key in versions[0] if key in versions[1]]
     print(table([(label, [cases[key] for key in common]) for label, cases in zip(labels, versions)]))
-    if alone := [f"{len(cases.keys() - set(common))} in {label} alone" for label, cases in zip(labels, versions) if cases.keys() - set(common)]:
-        print("not compared: " + ", ".join(alone))
+    for label, cases in zip(labels, versions):
+        if len(cases) > len(common):
+            print(f"{len(cases) - len(common)} recordings of {label} are not in the other and not compared")
     names = lambda rows: sorted((row["effect"], row["place"], row["mark"] or "", bool(row["wrong"])) for row in rows)
     for key in common:
         a, b = (cases[key] for cases in versions)
-        off = any(x is not None and y is not None and abs(x - y) > 0.05 * max(x, y) for x, y in ((a["after_mean_mm"], b["after_mean_mm"]), (a["after_nrmse"], b["after_nrmse"])))
+        x, y = (case["after_mean_mm"] or case["after_nrmse"] or 0.0 for case in (a, b))
+        off = abs(x - y) > 0.05 * max(x, y)
         if off or names(findings[0][key]) != names(findings[1][key]) or (a["exact"], a["verdict"]) != (b["exact"], b["verdict"]):
             print(f"\n{' '.join(key)}: wanted {a['wanted'] or 'nothing'}")
-            for label, case, rows in zip(labels, (a, b), (findings[0][key], findings[1][key])):
+            for label, case, rows in zip(labels, (a, b), (of[key] for of in findings)):
                 print("\n".join("  " + line for line in told(case, rows, label) if not line.startswith("    wanted ")))
 
 
@@ -338,7 +329,6 @@ def main():
     parser.add_argument("--compare", nargs=2, type=pathlib.Path, metavar=("A", "B"), help="prints a table of two outputs, and every recording that differs")
     parser.add_argument("--sets", nargs="+", choices=SETS, default=SETS)
     parser.add_argument("--repo", type=pathlib.Path, default=HERE, help="the checkout whose pipelines are run")
-    parser.add_argument("--practice", type=pathlib.Path, default=HERE.parent / "shared/practice")
     parser.add_argument("--maker", type=pathlib.Path, help="the binary that makes the recordings [default: BINARY]")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
@@ -348,10 +338,10 @@ def main():
         return compare(arguments)
     if not arguments.out:
         parser.error("BINARY and OUT are needed, or --compare A B")
-    arguments.maker = arguments.maker or arguments.binary
-    for key in ("binary", "out", "repo", "practice", "maker"):
-        setattr(arguments, key, getattr(arguments, key).resolve())
     os.nice(15 if arguments.nice else 0)
+    arguments.maker = arguments.maker or arguments.binary
+    for key in ("binary", "out", "repo", "maker"):
+        setattr(arguments, key, getattr(arguments, key).resolve())
     run(arguments)
 
 
