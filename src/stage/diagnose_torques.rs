@@ -170,7 +170,7 @@ impl Stage for DiagnoseTorques {
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),
             joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints(), sequence),
+            course: TorqueCourse::of(&diagnosis, recording.joints(), &sequence),
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
