@@ -86,7 +86,8 @@ impl ExaminedFile {
 
     fn drive(&mut self, quantity: &'static str, rows: &[Vec<usize>], unit: &str, check: Vec<&str>) {
         let choice = |columns: &Vec<usize>| Choice::of(vec![self.joints_line(quantity, columns, Some(unit))], columns.clone());
-        let account = format!("{quantity} ({})", self.shown(&rows[0]));
+        let (first, last) = (rows[0][0], rows[0][rows[0].len() - 1]);
+        let account = format!("{quantity} ({} to {})", self.sheet.names[first], self.sheet.names[last]);
         let check = (!check.is_empty()).then(|| check.join("; "));
         self.mappings.push(Mapping { quantity, choices: rows.iter().map(choice).collect(), check, account });
     }

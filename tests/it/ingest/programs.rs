@@ -55,6 +55,17 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
 }
 
 #[test]
+fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
+    let desk = desk("cell.MOD", RAPID, "p10,7,8,16\n");
+    let yaml = joined("cell.MOD", "rax_#") + "max_rejected_fraction: 0.9\n";
+    let taken = take(&desk, &yaml, robot("rrrrrr", 1.0)).expect("a recording");
+    let rejected: Vec<(i64, bool)> =
+        taken.rejected.0.iter().map(|row| (row.line, row.detail.matches("no partner").count() == 2)).collect();
+    assert_eq!(rejected, [(6, true)], "{:?}", taken.rejected.0);
+    assert_eq!(taken.intake.0.iter().map(|file| file.rejected).collect::<Vec<_>>(), [2, 0]);
+}
+
+#[test]
 fn an_external_axis_at_9e9_is_none_and_a_connected_one_is_a_joint() {
     let track = JOINED.replace(
         "columns: [J1, J2, J3, J4, J5, J6], unit: deg",
