@@ -140,8 +140,7 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
 
 /// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
 fn usual_name(key: &str) -> Option<usize> {
-    const SAID: [&str; 11] =
-        ["pos", "position", "positions", "angle", "angles", "ang", "winkel", "value", "deg", "rad", "data"];
+    const SAID: [&str; 11] = ["pos", "position", "positions", "angle", "angles", "ang", "winkel", "value", "deg", "rad", "data"];
     let mut pieces: Vec<&str> = key.split(['_', '#']).filter(|word| !word.is_empty() && !SAID.contains(word)).collect();
     let before = pieces.len();
     pieces.retain(|word| !words::MEASURED.contains(word));

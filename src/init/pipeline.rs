@@ -192,7 +192,19 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
 
 /// Quantities in the order in which they are written.
 const ORDER: [&str; 13] = [
-    "point_id", "time", "trajectory", "q", "usage", "target", "torque", "current", "direction", "velocity", "x", "payload", "temperature",
+    "point_id",
+    "time",
+    "trajectory",
+    "q",
+    "usage",
+    "target",
+    "torque",
+    "current",
+    "direction",
+    "velocity",
+    "x",
+    "payload",
+    "temperature",
 ];
 
 /// A mapping with what else may stand for it.

@@ -258,7 +258,8 @@ impl ExaminedFile {
         let named = |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
             // Beyond what ms of a date are, it is finer than any unit that is read.
-            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false)).filter(|_| self.sheet.largest(column) < 1e14),
+            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false))
+                .filter(|_| self.sheet.largest(column) < 1e14),
             Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
         };
         let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();

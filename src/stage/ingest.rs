@@ -222,7 +222,8 @@ fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut names: Vec<String> = Vec::with_capacity(all.len());
     for name in &all {
         // Another file may be called like a numbered one.
-        let numbered = (2..).map(|number| format!("{name} ({number})")).find(|other| !all.contains(other) && !names.contains(other));
+        let numbered =
+            (2..).map(|number| format!("{name} ({number})")).find(|other| !all.contains(other) && !names.contains(other));
         names.push(if names.contains(name) { numbered.unwrap_or_default() } else { name.clone() });
     }
     names

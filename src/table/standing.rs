@@ -137,7 +137,7 @@ impl Unseen {
 }
 
 /// Rms of both at the points that both have, and how many, where the first is worse.
-struct Comparison {
+struct StepComparison {
     rms: [f64; 2],
     points: usize,
     /// Difference of the mean squares in its standard errors, and how many points the scatter counts as.
@@ -146,7 +146,7 @@ struct Comparison {
 }
 
 /// The comparison of two steps, where the first is worse by more than does not matter.
-fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<Comparison> {
+fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<StepComparison> {
     let pairs: Vec<(f64, f64)> =
         one.iter().filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?))).collect();
     if pairs.len() < FEWEST {
@@ -161,10 +161,10 @@ fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<Comparison> {
     let independent = count / autocorrelation_time(&off, 1);
     let clearly = (own - theirs) / (variance / independent).sqrt();
     let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && clearly > CLEARLY;
-    is_worse.then(|| Comparison { rms: [own.sqrt(), theirs.sqrt()], points: pairs.len(), clearly, independent })
+    is_worse.then(|| StepComparison { rms: [own.sqrt(), theirs.sqrt()], points: pairs.len(), clearly, independent })
 }
 
-impl Comparison {
+impl StepComparison {
     /// Whether the least of so many comparisons has it by chance as seldom as a contradiction may be (Student's t; Bonferroni).
     fn contradicts(&self, comparisons: usize) -> bool {
         let chance = 0.5 * tail(self.clearly.powi(2), 1.0, (self.independent - 1.0).max(1.0));
@@ -184,8 +184,8 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
         let others = step.unseen.held_out.iter().filter(|(row, _)| !never.contains(row));
         step.unseen.folds.iter().chain(others).map(|(row, error)| (*row, *error)).collect()
     };
-    let compared = |a: &Step, b: &Step, found: Option<Comparison>| {
-        let Comparison { rms: [rms_mm, than_rms_mm], points, .. } = found?;
+    let compared = |a: &Step, b: &Step, found: Option<StepComparison>| {
+        let StepComparison { rms: [rms_mm, than_rms_mm], points, .. } = found?;
         Some(Withdrawn { step: a.id.clone(), rms_mm, than: b.id.clone(), than_rms_mm, points })
     };
     let mut stands = 0;

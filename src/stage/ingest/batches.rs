@@ -2,7 +2,6 @@
 //!
 //! Cells become text and numbers again: a number of 64 bits comes back the same, and there is one way of judging rows.
 
-use super::lists::unfolded;
 use super::record::{RecordFields, RecordReader};
 use crate::error::{Error, Result};
 use arrow::array::RecordBatch;
@@ -44,12 +43,12 @@ pub(super) struct BatchReader {
 }
 
 impl BatchReader {
-    /// Hands out what a decoder of `what` gives; a list of numbers is a column for each of them.
+    /// Hands out what a decoder of `what` gives.
     pub(super) fn new(label: &str, what: &'static str, source: Batches) -> Self {
         Self {
             label: label.into(),
             what,
-            source: unfolded(source),
+            source,
             is_named: false,
             batch: None,
             text: String::new(),

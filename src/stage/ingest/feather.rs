@@ -4,6 +4,7 @@
 
 use super::batches::{BatchReader, Batches, broken};
 use super::layout::FileLayout;
+use super::lists::unfolded;
 use super::record::{Buffered, FileFormat, RecordReader, failed};
 use crate::error::{Error, Result};
 use crate::raw;
@@ -43,7 +44,7 @@ pub(super) fn read(mut source: Buffered, label: &str) -> Result<BatchReader> {
         whole = matches!(batch, Some(Ok(_)));
         batch
     });
-    Ok(BatchReader::new(label, WHAT, Batches { schema, size, rows: None, batches: Box::new(batches) }))
+    Ok(BatchReader::new(label, WHAT, unfolded(Batches { schema, size, rows: None, batches: Box::new(batches) })))
 }
 
 /// What the decoder says, and what to do where the file is compressed in a way that it does not know.

@@ -31,7 +31,8 @@ pub(super) fn unfolded(mut source: Batches) -> Batches {
     let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
     let (rows, own) = (first.into_iter().chain(source.batches), schema.clone());
     let batches = Box::new(rows.map(move |batch| {
-        let columns = batch?.columns().iter().zip(&widths).map(|(column, width)| cells(column, *width)).collect::<Result<Vec<_>, _>>();
+        let columns =
+            batch?.columns().iter().zip(&widths).map(|(column, width)| cells(column, *width)).collect::<Result<Vec<_>, _>>();
         columns.and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat())).map_err(|error| error.to_string())
     }));
     Batches { schema, batches, ..source }

@@ -2,6 +2,7 @@
 
 use super::batches::{BATCH, BatchReader, Batches, broken};
 use super::layout::FileLayout;
+use super::lists::unfolded;
 use super::record::{Buffered, FileFormat, RecordReader, failed};
 use crate::error::Result;
 use crate::raw;
@@ -22,5 +23,5 @@ pub(super) fn read(mut source: Buffered, label: &str) -> Result<BatchReader> {
     let size = content.len() as u64;
     let file = raw::parquet(bytes::Bytes::from(content), BATCH).map_err(|error| broken(label, WHAT, error))?;
     let (schema, rows) = (file.schema.clone(), Some(file.rows));
-    Ok(BatchReader::new(label, WHAT, Batches { schema, size, rows, batches: Box::new(file) }))
+    Ok(BatchReader::new(label, WHAT, unfolded(Batches { schema, size, rows, batches: Box::new(file) })))
 }

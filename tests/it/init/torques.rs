@@ -52,7 +52,8 @@ fn joint_states_of_ros_are_told_by_their_names_and_an_effort_may_be_a_current() 
     let header = [of("effort"), of("velocity"), of("position")].join(",");
     let made = made(&[("log.csv", log(&header, 18, wave).into())]);
     made.has(&["q: {columns: [\"shoulder_pan_joint_position\"", "velocity: {columns: [\"shoulder_pan_joint_velocity\""]);
-    made.has(&["torque: {columns: [\"shoulder_pan_joint_effort\""]).says(&["# current: {columns: [\"shoulder_pan_joint_effort\""]);
+    made.has(&["torque: {columns: [\"shoulder_pan_joint_effort\""])
+        .says(&["# current: {columns: [\"shoulder_pan_joint_effort\""]);
 }
 
 #[test]
@@ -83,7 +84,8 @@ fn lists(count: usize) -> Vec<u8> {
     let rows = 0..30;
     let state = |k: usize| Some((0..count).map(|j| Some(wave(k, j).parse::<f32>().expect("a number"))).collect::<Vec<_>>());
     let state = ListArray::from_iter_primitive::<Float32Type, _, _>(rows.clone().map(state));
-    let points: Vec<f64> = rows.clone().flat_map(|k| point(k, ",").split(',').map(|x| x.parse().expect("a number")).collect::<Vec<f64>>()).collect();
+    let points: Vec<f64> =
+        rows.clone().flat_map(|k| point(k, ",").split(',').map(|x| x.parse().expect("a number")).collect::<Vec<f64>>()).collect();
     let field = Arc::new(Field::new("item", arrow::datatypes::DataType::Float64, true));
     let points = FixedSizeListArray::new(field, 3, Arc::new(Float64Array::from(points)), None);
     let time: Float64Array = rows.map(|k| 0.1 * k as f64).collect::<Vec<f64>>().into();
@@ -113,8 +115,16 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
 fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
     for (name, content, said) in [
         ("measure.ls", &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..], "is a FANUC program"),
-        ("measure.prg.txt", b"MODULE Measure\n  CONST jointtarget p1:=[[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n", "is an ABB program in RAPID: name it .mod or .prg"),
-        ("run.db3", b"SQLite format 3\0\x10\x00\x01\x01\x00", "a bag of ROS 2), which is not read yet: write its joint states as text"),
+        (
+            "measure.prg.txt",
+            b"MODULE Measure\n  CONST jointtarget p1:=[[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
+            "is an ABB program in RAPID: name it .mod or .prg",
+        ),
+        (
+            "run.db3",
+            b"SQLite format 3\0\x10\x00\x01\x01\x00",
+            "a bag of ROS 2), which is not read yet: write its joint states as text",
+        ),
         ("run.mcap", b"\x89MCAP0\r\n\x01\x00", "is a recording in MCAP, which is not read yet"),
     ] {
         let made = made(&[(name, content.to_vec())]);
@@ -132,7 +142,11 @@ fn a_folder_with_a_robot_file_keeps_it_and_joints_are_counted_by_it() {
         let output = calib(folder.path(), arguments, "");
         (output.status.code(), [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat())
     };
-    std::fs::write(folder.path().join("data.csv"), table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| format!("{},{}", joints(k, ","), point(k, ",")))).expect("a file");
+    std::fs::write(
+        folder.path().join("data.csv"),
+        table("A1,A2,A3,A4,A5,A6,X,Y,Z", |k| format!("{},{}", joints(k, ","), point(k, ","))),
+    )
+    .expect("a file");
     let robot = told(&["robots", "lrmate_200id"]).1;
     std::fs::write(folder.path().join("robot.yaml"), &robot).expect("a file");
     let (code, said) = told(&["init", ".", "--data", "data.csv", "--robot", "ur10e"]);

@@ -137,18 +137,18 @@ impl<'a> Fitter<'a> {
         let mut now = fitter.fit(&base, Vec::new());
         fitter.free = Some(now.fitted.free());
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
-        let shown = RepeatPairs::of(&fitter.data, &now.screening.kept).noise(&now.model, &fitter.data, &fitter.spread);
+        let kept = &now.screening.kept;
+        let shown = RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
         fitter.repeatability = shown.joints;
         fitter.scaled = shown.scale != 1.0;
         if fitter.scaled {
             fitter.data.points.sigma.iter_mut().for_each(|sigma| *sigma *= shown.scale);
-            now = fitter.fit(&base, Vec::new());
-            let returns = RepeatPairs::returns(&fitter.data, &now.screening.kept);
+            let returns = RepeatPairs::returns(&fitter.data, kept);
             let by_returns = returns.map_or(0.0, |pairs| pairs.repeatability(&now.model, &fitter.data, &fitter.spread).sigma);
             fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
         }
         fitter.repeated = fitter.repeatability.sigma;
-        if fitter.repeatability.sigma > 0.0 {
+        if fitter.repeatability.sigma > 0.0 || fitter.scaled {
             fitter.spread.put(&mut fitter.data, fitter.repeatability.sigma);
             now = fitter.fit(&base, Vec::new());
         }

@@ -14,9 +14,9 @@ use nalgebra::{Matrix3, Vector3};
 const LOWEST: f64 = 5e-7;
 const HIGHEST: f64 = 3e-4;
 const STEPS: usize = 60;
-/// Scales of the stated noise that are tried: from that of the usual repeat downwards, each by so much finer, since joints may have a part in it.
-const SCALES: usize = 9;
-const FINER: f64 = 0.8;
+/// Scales of the stated noise that are tried, a third as many, as shares of that of the usual repeat: joints may have a part in it.
+const SMALLEST: f64 = 0.28;
+const LARGEST: f64 = 1.2;
 
 /// Covariances per squared deviation of every joint, by row.
 #[derive(Default)]
@@ -154,7 +154,7 @@ impl RepeatPairs {
         let at_once = |[a, b]: &[usize; 2]| {
             let [from, to] = [data.rank_in_time(*a), data.rank_in_time(*b)];
             let mut between = (from.min(to) + 1..from.max(to)).map(|place| data.at_place(place));
-            between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
+            between.all(|k| data.near_pose(*a, k))
         };
         let (at_once, returns) = pairs.partition(at_once);
         [at_once, returns]
@@ -174,7 +174,7 @@ impl RepeatPairs {
             let all = std::iter::once(0.0).chain(deviations()).map(|sigma| (deviance(scale, sigma), sigma));
             all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.0))
         };
-        let scales = (0..SCALES).map(|k| shown * libm::pow(FINER, k as f64));
+        let scales = grid(SMALLEST * shown, LARGEST * shown, STEPS / 3);
         let best = scales.map(|scale| (best_joints(scale).0, scale)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((cost, scale)) = best else { return stated };
         let differs = (scale - 1.0).abs() > *SETTLED * scale.max(1.0);
@@ -270,7 +270,12 @@ fn scale_of(samples: &[Sample]) -> Option<f64> {
 
 /// Standard deviations of the joints that are tried, rad.
 fn deviations() -> impl Iterator<Item = f64> {
-    (0..STEPS).map(|k| LOWEST * libm::pow(HIGHEST / LOWEST, k as f64 / (STEPS - 1) as f64))
+    grid(LOWEST, HIGHEST, STEPS)
+}
+
+/// So many numbers from one to another, each the same share larger.
+fn grid(least: f64, greatest: f64, count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| least * libm::pow(greatest / least, k as f64 / (count - 1) as f64))
 }
 
 impl Sample {
