@@ -77,7 +77,7 @@ writes! {
 impl Stage for IngestTorques {
     const NAME: &'static str = "ingest_torques";
     const SUMMARY: &'static str = "reads joint positions with torques or motor currents of an arm that moves";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = IngestTorquesReads;
     type Writes = IngestTorquesWrites;
 
