@@ -2,9 +2,11 @@
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+mod not_read;
 mod utf16;
 mod workbook;
 
+pub use not_read::not_read;
 pub use utf16::{Utf16Reader, is_utf16};
 pub use workbook::{Workbook, is_workbook};
 

@@ -1,7 +1,7 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
 use super::{complain, emit};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Result};
 use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
 use crate::robot::LIBRARY;
 use clap::Args;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from: with comments, for the columns found in your recordings.
 ///
-/// Nothing is asked and nothing is overwritten. What was read from the files' columns is a proposal: lines to look at are marked CHECK, numbers
+/// Nothing is asked and nothing is overwritten: a robot.yaml that is there is used as it is. What was read from the files' columns is a proposal: lines to look at are marked CHECK, numbers
 /// to fill in REPLACE. Then: `calib check pipeline.yaml`, `calib run pipeline.yaml`.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -19,13 +19,15 @@ pub(super) struct InitArguments {
     /// The folder for robot.yaml and pipeline.yaml
     #[arg(value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Recordings, delimited text or workbooks (.xlsx): one file, the controller's and the tracker's, or a tracker's for each of several reflectors
+    /// Recordings, delimited text, workbooks (.xlsx) or columns (Parquet, Feather): one file, the controller's and the tracker's, a tracker's for each of several reflectors, or torques of an arm that moves
     #[arg(long, short, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
     /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace
-    #[arg(long, value_name = "ARM", default_value = KINDS[0].name(), value_parser = kinds())]
-    robot: RobotFileKind,
-    /// Takes the robot from this URDF instead
+    ///
+    /// Without it the robot.yaml of the folder; where there is none, the first typical one.
+    #[arg(long, value_name = "ARM", value_parser = kinds())]
+    robot: Option<RobotFileKind>,
+    /// Takes the robot from this URDF instead, or says where the URDF lies that the folder's robot.yaml refers to
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
     /// Its last link
@@ -66,11 +68,8 @@ pub(super) fn main(arguments: &InitArguments) -> u8 {
 fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     let InitArguments { folder, data, robot, urdf, tip } = arguments;
     let files = ["robot.yaml", "pipeline.yaml"].map(|name| folder.join(name));
-    let there = files.iter().filter(|path| path.exists());
-    let faults: Vec<Fault> =
-        there.map(|path| Fault::new(path.display().to_string(), "is already there; nothing was written")).collect();
-    if !faults.is_empty() {
-        return Err(Error::Spec(faults));
+    if files[1].exists() {
+        return Err(Error::spec(files[1].display().to_string(), "is already there; nothing was written"));
     }
     let start = start(&InitRequest { folder, data, robot: *robot, urdf: urdf.as_deref(), tip })?;
     let refused = |path: &Path| {
@@ -78,7 +77,8 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
         move |error: std::io::Error| Error::store(place.clone(), format!("cannot be written: {error}"))
     };
     std::fs::create_dir_all(folder).map_err(refused(folder))?;
-    for (path, text) in files.iter().zip([&start.robot, &start.pipeline]) {
+    let texts = [start.robot.as_ref(), Some(&start.pipeline)];
+    for (path, text) in files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))) {
         std::fs::write(path, text).map_err(refused(path))?;
     }
     emit(&closing(arguments, &start, &files))?;
@@ -91,8 +91,13 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
         text.push_str(&format!("{}: {account}\n", path.display()));
     }
     let [robot, pipeline] = files.each_ref().map(|path| path.display());
-    text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n"));
-    if let RobotFileKind::Arm(_) = arguments.robot {
+    match &start.robot {
+        Some(_) => text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n")),
+        None => text.push_str(&format!("wrote {pipeline} beside {robot}, which is used as it is\n\nnext:\n")),
+    }
+    if start.robot.is_none() {
+        text.push_str(&format!("  1. {robot}: see that it is the robot of these recordings\n"));
+    } else if let Some(RobotFileKind::Arm(_)) = arguments.robot {
         text.push_str(&format!("  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"));
     } else if arguments.urdf.is_none() {
         text.push_str(&format!("  1. {robot}: put your robot's numbers where it says REPLACE\n"));

@@ -157,7 +157,9 @@ impl ExaminedFile {
         let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
         let names: Vec<&str> = columns.iter().map(|column| self.sheet.names[*column].as_str()).collect();
         let alone = columns.iter().all(|column| self.reference(*column).starts_with('"'));
-        match pattern(&names).filter(|_| alone) {
+        // A pattern stands for all that are called so.
+        let more = |pattern: &String| self.named.contains_key(&pattern.replace("{j}", &(names.len() + 1).to_string()));
+        match pattern(&names).filter(|pattern| alone && !more(pattern)) {
             Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
             None => {
                 let list: Vec<String> = columns.iter().map(|column| self.reference(*column)).collect();

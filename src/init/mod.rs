@@ -1,7 +1,9 @@
 //! What a folder of files is, and the pipeline that reads it: columns by their names and values, how files belong together, and a robot
-//! file to start from. All of it is a proposal; lines to look at are marked CHECK, numbers to fill in REPLACE.
+//! file to start from where none is there. All of it is a proposal; lines to look at are marked CHECK, numbers to fill in REPLACE.
 
+mod arm;
 mod columns;
+mod drives;
 mod marks;
 mod names;
 mod pipeline;
@@ -16,9 +18,8 @@ mod words;
 pub use marks::{MarkedLines, marked};
 pub use robots::{KINDS, RobotFileKind};
 
-use crate::error::{Error, Result, counted};
-use crate::raw;
-use crate::robot::import::{RobotFileText, UrdfOutline, urdf_outline};
+use crate::error::{Error, Result};
+use arm::StartingArm;
 use columns::ExaminedFile;
 use pipeline::missing;
 use quantities::examine;
@@ -30,9 +31,9 @@ pub struct InitRequest<'a> {
     pub folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
     pub data: &'a [PathBuf],
-    /// The kind to start from.
-    pub robot: RobotFileKind,
-    /// The robot instead, and its last link.
+    /// The kind to start from; none where nobody asked for one: the folder's own robot.yaml, else the first kind.
+    pub robot: Option<RobotFileKind>,
+    /// The robot instead, and its last link; of a robot.yaml that is there the URDF that it refers to.
     pub urdf: Option<&'a Path>,
     /// Last link of the chain in the URDF.
     pub tip: &'a str,
@@ -40,8 +41,8 @@ pub struct InitRequest<'a> {
 
 /// Files to start from.
 pub struct StarterFiles {
-    /// Text of `robot.yaml`.
-    pub robot: String,
+    /// Text of `robot.yaml`; none where it is there already.
+    pub robot: Option<String>,
     /// Text of `pipeline.yaml`.
     pub pipeline: String,
     /// What was found in each recording, and which.
@@ -57,21 +58,16 @@ impl StarterFiles {
     }
 }
 
-/// Where the chain of a URDF begins, and which of its joints slide.
-fn outline(path: &Path, tip: &str) -> Result<UrdfOutline> {
-    let label = path.display().to_string();
-    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
-    urdf_outline(RobotFileText { label: &label, text: &text }, tip)
-}
-
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
-    let tables = request.data.iter().map(|path| examine(path, places)).collect::<Result<Vec<_>>>()?;
+    let arm = StartingArm::of(request)?;
+    let tables = request.data.iter().map(|path| examine(path, places, arm.joints)).collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
+    let of_torques = drives::of_torques(&mut found);
     let more = together::other_reflectors(&mut found);
-    if found.len() > 2 && !found.iter().all(together::is_whole) {
+    if found.len() > 2 && !of_torques && !found.iter().all(together::is_whole) {
         let message = format!(
             "{} files; allowed: one recording, the controller's and the tracker's, the controller's and a list of points in one layout for each \
              of several reflectors, or recordings that have joints and points each",
@@ -80,38 +76,20 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         return Err(Error::spec("--data", message));
     }
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
-    let urdf = request.urdf.map(|path| outline(path, request.tip)).transpose()?;
-    let robot = match &urdf {
-        Some(UrdfOutline { base, sliding }) => {
-            if let Some(n) = joints.filter(|n| *n != sliding.len()) {
-                let message = format!(
-                    "the chain from `{base}` to `{}` has {}, the recording {n}; name the last link that moves, or one fixed to it",
-                    request.tip,
-                    counted(sliding.len(), "joint")
-                );
-                return Err(Error::spec("--tip", message));
-            }
-            robots::of_urdf(base, request.tip)
-        }
-        None => {
-            let own = request.robot.joints()?;
-            if let Some(n) = joints.filter(|n| *n != own) {
-                let (name, own) = (request.robot.name(), counted(own, "joint"));
-                return Err(Error::spec("--robot", format!("{name} has {own}, the recording {n}; choose another kind")));
-            }
-            request.robot.text()
-        }
+    joints.map_or(Ok(()), |joints| arm.agrees(joints))?;
+    let pipeline = if of_torques {
+        pipeline::of_torques(request, &found, &arm)
+    } else {
+        let mut joined = together::join(&mut found);
+        joined.lines.extend(pipeline::later(request.folder, &found, &more));
+        pipeline::text(request, &found, (&joined, &arm))
     };
-    let mut joined = together::join(&mut found);
-    joined.lines.extend(pipeline::later(request.folder, &found, &more));
-    let sliding = urdf.map(|outline| outline.sliding).unwrap_or_default();
-    let pipeline = pipeline::text(request, &found, (&joined, &sliding))?;
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
     Ok(StarterFiles {
-        robot,
+        robot: arm.text,
         pipeline,
         accounts: found.iter().chain(more.iter().map(|(_, file)| file)).map(|file| (file.path.clone(), file.account())).collect(),
-        missing: if found.is_empty() {
+        missing: if found.is_empty() || of_torques {
             Vec::new()
         } else {
             unknown.filter(|(_, missing)| *missing).map(|(what, _)| what).collect()

@@ -84,8 +84,13 @@ fn axis(word: &str) -> Option<(usize, &str)> {
     named.filter(|(_, more)| more.len() < word.len())
 }
 
-/// Rows of columns that may be the joints, best first: those of usual names, else the longest of four or more that `angle` takes for angles.
-pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+/// Whether a word says that a numbered column is no joint position.
+fn is_other(word: &str) -> bool {
+    [&words::NO_JOINTS[..], &words::TORQUES, &words::CURRENTS, &words::VELOCITIES].iter().any(|listed| listed.contains(&word))
+}
+
+/// Rows of columns that may be the joints, best first: those of usual names, else those of an arm's `count` that `angle` takes for angles.
+pub(super) fn joints(names: &[Name], count: usize, angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
     let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS.iter().filter_map(|listed| named(names, listed)).collect();
     // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
@@ -111,11 +116,10 @@ pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<u
     found.extend(usual.into_iter().map(|(_, _, columns)| columns));
     if found.is_empty() {
         let foreign = runs.into_iter().filter(|(key, columns)| {
-            let other = key.split(['_', '#']).any(|word| words::NO_JOINTS.contains(&word));
-            columns.len() >= 4 && !other && columns.iter().all(|column| angle(*column))
+            let other = key.split(['_', '#']).any(is_other);
+            columns.len() == count && !other && columns.iter().all(|column| angle(*column))
         });
         found.extend(foreign.map(|(_, columns)| columns));
-        found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     }
     let longest = found.first().map_or(0, Vec::len);
     found.retain(|columns| columns.len() == longest);
@@ -128,7 +132,7 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
     let column = |wanted: &&str| {
         names.iter().position(|name| {
             let stem = name.stem();
-            if letters { stem == *wanted } else { stem.contains(wanted) }
+            if letters { stem == *wanted } else { stem.contains(wanted) && !name.words.iter().any(|word| is_other(word)) }
         })
     };
     listed.iter().map(column).collect()
@@ -136,7 +140,7 @@ fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
 
 /// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
 fn usual_name(key: &str) -> Option<usize> {
-    const SAID: [&str; 8] = ["pos", "position", "angle", "ang", "winkel", "value", "deg", "rad"];
+    const SAID: [&str; 11] = ["pos", "position", "positions", "angle", "angles", "ang", "winkel", "value", "deg", "rad", "data"];
     let mut pieces: Vec<&str> = key.split(['_', '#']).filter(|word| !word.is_empty() && !SAID.contains(word)).collect();
     let before = pieces.len();
     pieces.retain(|word| !words::MEASURED.contains(word));
@@ -190,24 +194,24 @@ mod tests {
     #[test]
     fn joints_are_found_under_names_that_nobody_foresaw() {
         let all = names(&["Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist"]);
-        assert_eq!(joints(&all, |_| true), [[2, 3, 4, 5, 6]]);
-        assert!(joints(&all, |column| column != 4).is_empty());
-        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), |_| false), [[2, 3]]);
-        assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), |_| false), [[1, 2, 3, 4, 5, 0]]);
-        assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), |_| true), [[2, 3], [0, 1]]);
+        assert_eq!(joints(&all, 5, |_| true), [[2, 3, 4, 5, 6]]);
+        assert!(joints(&all, 5, |column| column != 4).is_empty());
+        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), 6, |_| false), [[2, 3]]);
+        assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), 6, |_| false), [[1, 2, 3, 4, 5, 0]]);
+        assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), 6, |_| true), [[2, 3], [0, 1]]);
         let yaskawa = ["joint_1_s", "joint_2_l", "joint_3_u", "joint_4_r", "joint_5_b", "joint_6_t"];
-        assert_eq!(joints(&names(&yaskawa), |_| true), [[0, 1, 2, 3, 4, 5]]);
+        assert_eq!(joints(&names(&yaskawa), 6, |_| true), [[0, 1, 2, 3, 4, 5]]);
         for pattern in
             ["J#", "A#", "Axis_#", "q_#", "panda_joint#", "iiwa_joint_#", "lbr_A#", "robot1/joint_#", "joint_#_position"]
         {
             let all: Vec<String> = (1..=6).map(|n| pattern.replace('#', &n.to_string())).collect();
             let all: Vec<&str> = all.iter().map(String::as_str).collect();
-            assert_eq!(joints(&names(&all), |_| true), [[0, 1, 2, 3, 4, 5]], "{pattern}");
+            assert_eq!(joints(&names(&all), 6, |_| true), [[0, 1, 2, 3, 4, 5]], "{pattern}");
         }
-        assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), |_| true), [[2, 3]]);
+        assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), 6, |_| true), [[2, 3]]);
         let robot = ["ur_shoulder_pan_joint", "ur_shoulder_lift_joint", "ur_elbow_joint"];
         let wrist = ["ur_wrist_1_joint", "ur_wrist_2_joint", "ur_wrist_3_joint"];
-        assert_eq!(joints(&names(&[robot, wrist].concat()), |_| true), [[0, 1, 2, 3, 4, 5]]);
+        assert_eq!(joints(&names(&[robot, wrist].concat()), 6, |_| true), [[0, 1, 2, 3, 4, 5]]);
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The text of the pipeline that `init` writes.
 
 use super::InitRequest;
+use super::arm::StartingArm;
 use super::columns::{Choice, ExaminedFile, MOST_NAMED, Mapping};
 use super::together::Joined;
-use crate::error::{Result, one_line};
+use crate::error::one_line;
 use crate::stage::ingest::instruments;
 use crate::yaml::quoted;
 use std::path::Path;
@@ -16,8 +17,8 @@ fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-/// `sliding`: which joints of a URDF are prismatic.
-pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, sliding): (&Joined, &[bool])) -> Result<String> {
+/// Name, and the stage that reads the robot.
+fn head(request: &InitRequest) -> String {
     // A folder that is still to be made has its name already.
     let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
     let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -28,29 +29,41 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, slidi
     );
     let urdf = request.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
     out.push_str(&format!("  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n", urdf.unwrap_or_default()));
-    out.push_str(
-        "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n",
-    );
-    out.push_str("  - uses: ingest\n    with:\n      files:\n");
-    let counting = if request.urdf.is_none() { request.robot.counting()? } else { linear(found, sliding) };
+    out + "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n"
+}
+
+/// The pipeline of an arm that moves while its torques are recorded.
+pub(super) fn of_torques(request: &InitRequest, found: &[ExaminedFile], arm: &StartingArm) -> String {
+    let mut out = head(request) + "  - uses: ingest_torques\n    with:\n      files:\n";
+    out.push_str(&files(request, found, arm, [false; 2]));
+    out + OF_TORQUES
+}
+
+pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], (joined, arm): (&Joined, &StartingArm)) -> String {
+    let mut out = head(request) + "  - uses: ingest\n    with:\n      files:\n";
     if found.is_empty() {
-        out.push_str(&EMPTY.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
+        out.push_str(&EMPTY.lines().map(|line| counted(line, counting(found, arm).as_deref()) + "\n").collect::<String>());
     }
-    let missing = missing(found);
-    for (k, file) in found.iter().enumerate() {
-        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, &file.path)));
-        // Joints come first, in the controller's file; the tracker's is the last.
-        let lacks =
-            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints()? };
-        let text = file_text(file, &lacks);
-        out.push_str(&text.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
-    }
+    out.push_str(&files(request, found, arm, missing(found)));
     joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
     out.push_str(&instrument());
     let by_usage = found.iter().any(|file| file.get("usage").is_some());
     out.push_str(if by_usage { BY_USAGE } else { EVERY });
-    out.push_str(STAGES);
-    Ok(out)
+    out + STAGES
+}
+
+/// The settings of all files; `missing`: whether none has the joints, the point.
+fn files(request: &InitRequest, found: &[ExaminedFile], arm: &StartingArm, missing: [bool; 2]) -> String {
+    let counting = counting(found, arm);
+    let mut out = String::new();
+    for (k, file) in found.iter().enumerate() {
+        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, &file.path)));
+        // Joints come first, in the controller's file; the tracker's is the last.
+        let lacks = Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: arm.joints };
+        let text = file_text(file, &lacks);
+        out.push_str(&text.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
+    }
+    out
 }
 
 /// The line of joints with how the arm's controller counts them; any other line as it is.
@@ -61,6 +74,12 @@ fn counted(line: &str, counting: Option<&str>) -> String {
     // The map ends at the last brace before a comment: names of columns may hold both.
     let end = line.find("}   #").unwrap_or(line.len() - 1);
     format!("{}, {counting}{}", &line[..end], &line[end..])
+}
+
+/// What else is to be said of joints, as settings of `q`.
+fn counting(found: &[ExaminedFile], arm: &StartingArm) -> Option<String> {
+    let settings: Vec<String> = linear(found, &arm.sliding).into_iter().chain(arm.counting.clone()).collect();
+    Some(settings.join(", ")).filter(|settings| !settings.is_empty())
 }
 
 /// The unit of joints that slide, as a setting of `q`: by the first one's name, else by its size.
@@ -172,8 +191,21 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
 }
 
 /// Quantities in the order in which they are written.
-const ORDER: [&str; 11] =
-    ["point_id", "time", "q", "usage", "target", "current", "direction", "velocity", "x", "payload", "temperature"];
+const ORDER: [&str; 13] = [
+    "point_id",
+    "time",
+    "trajectory",
+    "q",
+    "usage",
+    "target",
+    "torque",
+    "current",
+    "direction",
+    "velocity",
+    "x",
+    "payload",
+    "temperature",
+];
 
 /// A mapping with what else may stand for it.
 fn mapped(mapping: &Mapping) -> String {
@@ -218,6 +250,13 @@ fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
         put(&format!("point_id: {{column: {column}}}   # REPLACE: no column was recognised"));
     }
 }
+
+const OF_TORQUES: &str = "
+  # What the torques of the rigid arm lack, by the masses of the robot file; where it has none they are identified.
+  - uses: diagnose_torques
+
+  - uses: report_torques
+";
 
 const EMPTY: &str = "        - file: measurements.csv        # REPLACE
           columns:

@@ -4,6 +4,7 @@ use super::columns::{Choice, ExaminedFile, Mapping};
 use super::names::{LENGTHS, joints};
 use super::points::{PointColumns, Points, points};
 use super::reading::tables;
+use super::sheet::number;
 use super::words;
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
@@ -15,14 +16,14 @@ const MOST_RADIANS: f64 = 6.5;
 /// Beyond this coordinates are millimetres, by the size of robots.
 const MOST_METRES: f64 = 50.0;
 
-/// The tables of a file, of which there is place for so many.
-pub(super) fn examine(path: &Path, places: usize) -> Result<Vec<ExaminedFile>> {
+/// The tables of a file, of which there is place for so many, of an arm of so many joints.
+pub(super) fn examine(path: &Path, places: usize, joints: usize) -> Result<Vec<ExaminedFile>> {
     let examined = |sheet| {
         let mut found = ExaminedFile::unknown(path, sheet);
         if !found.sheet.header {
             found.bare();
         } else if found.sheet.trouble.is_none() {
-            found.joints();
+            found.joints(joints);
             found.point();
             found.quaternion();
             found.per_joint();
@@ -58,7 +59,8 @@ impl ExaminedFile {
                     account,
                 }
             }
-            [_, _, _, _, _, _] | [_, _, _, _, _, _, _] if most <= 400.0 => {
+            // Seven numbers may be a point with a quaternion.
+            [_, _, _, _, _, _] | [_, _, _, _, _, _, _] if most <= 400.0 && !self.is_unit(&columns[columns.len() - 4..]) => {
                 let unit = if most > MOST_RADIANS { "deg" } else { "rad" };
                 let lines = vec![self.joints_line("q", &columns, Some(unit))];
                 let account = format!("{} joints ({})", columns.len(), self.shown(&columns));
@@ -70,14 +72,17 @@ impl ExaminedFile {
         self.mappings.push(mapping);
     }
 
-    fn joints(&mut self) {
+    fn joints(&mut self, count: usize) {
         let angle = |column: usize| {
             self.sheet.is_numeric(column)
                 && self.sheet.largest(column) <= 400.0
                 && self.said[column].unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
-        let mut rows = joints(&self.said, angle);
-        rows.retain(|columns| columns.iter().all(|column| self.sheet.is_numeric(*column)));
+        let mut rows = joints(&self.said, count, angle);
+        rows.retain(|columns| columns.iter().all(|column| self.sheet.is_numeric(*column)) && !self.is_unit(columns));
+        // A list holds what else an arm has beside its joints: a gripper.
+        let numbers = rows.first().filter(|row| self.sheet.names[row[0]].ends_with(']')).map_or(0, Vec::len);
+        rows.iter_mut().filter(|_| numbers > count).for_each(|row| row.truncate(count));
         let Some(best) = rows.first() else { return };
         let turning = |column: &&usize| self.said[**column].unit_of(&LENGTHS).is_none();
         let degrees = best.iter().filter(turning).any(|column| self.sheet.largest(*column) > MOST_RADIANS);
@@ -88,7 +93,8 @@ impl ExaminedFile {
             None => ("rad", Some("no value is beyond 6.5; are these degrees?".to_string())),
         };
         let several = (rows.len() > 1).then(|| "several columns of joints fit".to_string());
-        let check: Vec<String> = several.into_iter().chain(why).collect();
+        let of_list = (numbers > count).then(|| format!("of the {numbers} numbers of the list the first {count}"));
+        let check: Vec<String> = several.into_iter().chain(of_list).chain(why).collect();
         let account =
             format!("{} joints ({} to {})", best.len(), self.sheet.names[best[0]], self.sheet.names[best[best.len() - 1]]);
         let choice = |columns: &Vec<usize>| Choice::of(vec![self.joints_line("q", columns, Some(unit))], columns.clone());
@@ -99,6 +105,12 @@ impl ExaminedFile {
             account,
         };
         self.mappings.push(mapping);
+    }
+
+    /// Whether four columns are a quaternion.
+    fn is_unit(&self, columns: &[usize]) -> bool {
+        let square = |row: &Vec<String>| columns.iter().filter_map(|column| number(&row[*column])).map(|x| x * x).sum::<f64>();
+        columns.len() == 4 && self.sheet.rows.iter().all(|row| (square(row) - 1.0).abs() < 1e-3)
     }
 
     fn point(&mut self) {
@@ -245,7 +257,9 @@ impl ExaminedFile {
     fn time(&mut self) {
         let named = |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
         let unit = |column: usize| match self.said[column].unit {
-            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false)),
+            // Beyond what ms of a date are, it is finer than any unit that is read.
+            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false))
+                .filter(|_| self.sheet.largest(column) < 1e14),
             Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
         };
         let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();

@@ -3,8 +3,8 @@
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
-use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook};
-use crate::stage::ingest::{ListedTable, encoding};
+use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook, not_read};
+use crate::stage::ingest::{ListedTable, encoding, first_rows};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -26,8 +26,15 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
         let table = ListedTable::read(reader, &place, language);
         return Ok(vec![table.map_or_else(|error| Sheet::not_understood(error.to_string()), Sheet::of_program)]);
     }
-    if let Some(kind) = no_text(head) {
-        return Ok(vec![Sheet::not_understood(kind.into())]);
+    if let Some(what) = not_read(head) {
+        return Ok(vec![Sheet::not_understood(what.into())]);
+    }
+    if !is_utf16(head) && head.contains(&0) {
+        let rows = first_rows(Box::new(reader), &place, LINES);
+        return Ok(vec![match rows {
+            Ok(rows) => rows.map_or_else(|| Sheet::not_understood("no text".into()), Sheet::of_columns),
+            Err(error) => Sheet::not_understood(error.to_string()),
+        }]);
     }
     let mut lines: Vec<String> = Vec::new();
     let wide = is_utf16(head);
@@ -49,14 +56,4 @@ fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
         Ok(Sheet::of_workbook(name, &lines))
     };
     names.iter().map(sheet).collect()
-}
-
-/// What a file is that is no delimited text.
-fn no_text(head: &[u8]) -> Option<&'static str> {
-    match head {
-        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file: its columns are not looked at; name them"),
-        _ if is_utf16(head) => None,
-        _ if head.contains(&0) => Some("no text"),
-        _ => None,
-    }
 }

@@ -1,6 +1,6 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
-use crate::stage::ingest::ListedTable;
+use crate::stage::ingest::{FirstRows, ListedTable};
 use crate::units::{Unit, written};
 
 /// So many lines say what separates fields.
@@ -121,6 +121,11 @@ impl Sheet {
             rows: table.rows.into_iter().map(|(_, cells)| cells).collect(),
             ..Self::default()
         }
+    }
+
+    /// A file of columns.
+    pub fn of_columns(FirstRows { names, rows }: FirstRows) -> Self {
+        Self { delimiter: ',', header: true, names, rows, ..Self::default() }
     }
 
     fn delimited(lines: &[String], given: Option<char>) -> Self {

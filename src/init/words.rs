@@ -1,7 +1,7 @@
 //! The words that people use in headers, in small letters: English, German, French, Spanish, Italian.
 
 /// What the joints' columns are usually called; the number of the joint follows.
-pub(super) const JOINTS: [&str; 15] = [
+pub(super) const JOINTS: [&str; 20] = [
     "q",
     "a",
     "rax",
@@ -16,6 +16,11 @@ pub(super) const JOINTS: [&str; 15] = [
     "eje",
     "jnt",
     "joint_angle",
+    "joint_state",
+    "joint_states",
+    "observation_state",
+    "qpos",
+    "observation_qpos",
     "articulaci\u{f3}n",
 ];
 
@@ -26,19 +31,47 @@ pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
     &["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"],
 ];
 
-/// What a numbered column that is no joint position is called.
-pub(super) const NO_JOINTS: [&str; 22] = [
-    "i",
-    "dir",
+/// What joint torques, motor currents and joint velocities are called beside the number or name of a joint.
+pub(super) const TORQUES: [&str; 14] = [
+    "tau",
+    "torque",
+    "torques",
+    "trq",
+    "effort",
+    "efforts",
+    "moment",
+    "moments",
+    "drehmoment",
+    "drehmomente",
+    "couple",
+    "coppia",
+    "momento",
+    "momente",
+];
+pub(super) const CURRENTS: [&str; 11] =
+    ["i", "iq", "cur", "curr", "current", "currents", "strom", "courant", "corriente", "corrente", "amps"];
+pub(super) const VELOCITIES: [&str; 14] = [
     "dq",
     "qd",
+    "qdot",
     "vel",
+    "vels",
     "velocity",
-    "cur",
-    "current",
-    "strom",
-    "torque",
-    "tau",
+    "velocities",
+    "speed",
+    "speeds",
+    "geschwindigkeit",
+    "vitesse",
+    "velocidad",
+    "velocit\u{e0}",
+    "rate",
+];
+/// Which of several movements a row belongs to.
+pub(super) const TRAJECTORIES: [&str; 7] = ["traj", "trajectory", "trajectory_id", "episode", "episode_index", "run", "segment"];
+
+/// What else a numbered column that is no joint position is called.
+pub(super) const NO_JOINTS: [&str; 38] = [
+    "dir",
     "temp",
     "motor",
     "load",
@@ -47,9 +80,35 @@ pub(super) const NO_JOINTS: [&str; 22] = [
     "sigma",
     "std",
     "acc",
+    "accel",
     "e",
-    "drehmoment",
-    "speed",
+    "ddq",
+    "qdd",
+    "force",
+    "forces",
+    "ft",
+    "wrench",
+    "strain",
+    "gauge",
+    "sensor",
+    "channel",
+    "ch",
+    "ai",
+    "di",
+    "do",
+    "io",
+    "input",
+    "output",
+    "volt",
+    "voltage",
+    "power",
+    "pressure",
+    "tcp",
+    "pose",
+    "cartesian",
+    "marker",
+    "dist",
+    "distance",
 ];
 
 /// What the parts of a quaternion are called before `w`, `x`, `y`, `z`.

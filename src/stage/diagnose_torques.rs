@@ -109,7 +109,7 @@ writes! {
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 8;
+    const IMPLEMENTATION: u32 = 9;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -170,7 +170,7 @@ impl Stage for DiagnoseTorques {
             numbers: TorqueNumbers::of(&diagnosis),
             rivals: TorqueRivals::of(&diagnosis),
             joints: JointTorques::of(&diagnosis),
-            course: TorqueCourse::of(&diagnosis, recording.joints(), sequence),
+            course: TorqueCourse::of(&diagnosis, recording.joints(), &sequence),
             friction: FrictionCurves::of(&diagnosis),
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),

@@ -26,6 +26,7 @@ mod later;
 mod layout;
 mod lines;
 mod listing;
+mod lists;
 mod mapped;
 mod motion;
 mod noise;
@@ -60,6 +61,7 @@ pub use mapped::{
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub use reading::{FirstRows, first_rows};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 pub use wide::WideTargets;
 
@@ -134,7 +136,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 
@@ -177,7 +179,7 @@ impl Stage for Ingest {
             scanned.push((scans, decisions));
         }
         copies::refuse(&scanned)?;
-        let names = names(scanned.iter().flat_map(|(scans, _)| scans));
+        let names = names(scanned.iter().flat_map(|(scans, _)| scans).map(|scan| scan.label.as_str()));
         let each = measurements.iter().zip(&scanned).zip(names.chunks(self.files.len().max(1)));
         let decided: Vec<joined::JoinDecisions> = each
             .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
@@ -214,16 +216,17 @@ impl Ingest {
 }
 
 /// The files' own names, made different where two are the same: a folder is no part of a table.
-fn names<'a>(scans: impl Iterator<Item = &'a scan::Scan>) -> Vec<String> {
-    let own = |scan: &scan::Scan| {
-        Path::new(&scan.label).file_name().map_or_else(|| scan.label.clone(), |name| name.to_string_lossy().into_owned())
-    };
-    let all: Vec<String> = scans.map(own).collect();
-    let numbered = all.iter().enumerate().map(|(index, name)| {
-        let earlier = all.iter().take(index).filter(|other| *other == name).count();
-        if earlier == 0 { name.clone() } else { format!("{name} ({})", earlier + 1) }
-    });
-    numbered.collect()
+fn names<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let own = |label: &str| Path::new(label).file_name().map_or_else(|| label.into(), |name| name.to_string_lossy().into_owned());
+    let all: Vec<String> = labels.map(own).collect();
+    let mut names: Vec<String> = Vec::with_capacity(all.len());
+    for name in &all {
+        // Another file may be called like a numbered one.
+        let numbered =
+            (2..).map(|number| format!("{name} ({number})")).find(|other| !all.contains(other) && !names.contains(other));
+        names.push(if names.contains(name) { numbered.unwrap_or_default() } else { name.clone() });
+    }
+    names
 }
 
 fn intake(decided: &[joined::JoinDecisions], context: &Context) -> Intake {

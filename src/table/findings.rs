@@ -37,6 +37,11 @@ pub(super) fn ranked<F>(findings: &[F]) -> impl Iterator<Item = (i64, &F)> {
     (1..).zip(findings)
 }
 
+/// Of two probabilities, those that are known.
+pub(super) fn sum<P: From<f64> + Into<Option<f64>>>(one: P, other: P) -> P {
+    P::from(one.into().unwrap_or(0.0) + other.into().unwrap_or(0.0))
+}
+
 /// The tables of a diagnosis that stand beside its findings: their numbers, and their rivals.
 macro_rules! beside_findings {
     ($diagnosis:ty => $numbers:ident of $number_row:ident, $rivals:ident of $rival_row:ident) => {
@@ -72,6 +77,15 @@ macro_rules! beside_findings {
                 });
                 let mut rows: Vec<$rival_row> = rows.collect();
                 rows.sort_by(|a, b| (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place)));
+                // Several names of one finding may have one rival.
+                rows.dedup_by(|next, kept| {
+                    let same = (next.rank, &next.effect, &next.place) == (kept.rank, &kept.effect, &kept.place);
+                    if same {
+                        kept.delta_bic = kept.delta_bic.min(next.delta_bic);
+                        kept.probability = $crate::table::findings::sum(kept.probability, next.probability);
+                    }
+                    same
+                });
                 Self(rows)
             }
         }

@@ -7,12 +7,15 @@
 use super::{Frame, Prediction};
 use crate::error::Result;
 use crate::estimate::autocorrelation_time;
+use crate::estimate::fisher::tail;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// A step is worse where its rms is larger by this share, and its squares by so many standard errors.
 const WORSE: f64 = 0.03;
 const CLEARLY: f64 = 2.0;
+/// Held-out points contradict a choice where an earlier step, of however many, is so much better by chance in one of so many runs.
+const CONTRADICTED: f64 = 1e-3;
 /// Fewer points than this say nothing.
 const FEWEST: usize = 5;
 
@@ -134,7 +137,16 @@ impl Unseen {
 }
 
 /// Rms of both at the points that both have, and how many, where the first is worse.
-fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<(f64, f64, usize)> {
+struct StepComparison {
+    rms: [f64; 2],
+    points: usize,
+    /// Difference of the mean squares in its standard errors, and how many points the scatter counts as.
+    clearly: f64,
+    independent: f64,
+}
+
+/// The comparison of two steps, where the first is worse by more than does not matter.
+fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<StepComparison> {
     let pairs: Vec<(f64, f64)> =
         one.iter().filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?))).collect();
     if pairs.len() < FEWEST {
@@ -146,9 +158,18 @@ fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<(f64, f64, usize)> {
     let off: Vec<f64> = pairs.iter().map(|(own_square, square)| own_square - square - (own - theirs)).collect();
     let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
     // Points along a path are not as many opinions as there are points.
-    let error = (variance * autocorrelation_time(&off, 1) / count).sqrt();
-    let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && own - theirs > CLEARLY * error;
-    is_worse.then(|| (own.sqrt(), theirs.sqrt(), pairs.len()))
+    let independent = count / autocorrelation_time(&off, 1);
+    let clearly = (own - theirs) / (variance / independent).sqrt();
+    let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && clearly > CLEARLY;
+    is_worse.then(|| StepComparison { rms: [own.sqrt(), theirs.sqrt()], points: pairs.len(), clearly, independent })
+}
+
+impl StepComparison {
+    /// Whether the least of so many comparisons has it by chance as seldom as a contradiction may be (Student's t; Bonferroni).
+    fn contradicts(&self, comparisons: usize) -> bool {
+        let chance = 0.5 * tail(self.clearly.powi(2), 1.0, (self.independent - 1.0).max(1.0));
+        chance * (comparisons as f64) < CONTRADICTED
+    }
 }
 
 /// The step that stands for a run of `steps`, in the order of the pipeline, with the last diagnosis `diagnosed` where there is one.
@@ -163,8 +184,8 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
         let others = step.unseen.held_out.iter().filter(|(row, _)| !never.contains(row));
         step.unseen.folds.iter().chain(others).map(|(row, error)| (*row, *error)).collect()
     };
-    let compared = |a: &Step, b: &Step, found: Option<(f64, f64, usize)>| {
-        let (rms_mm, than_rms_mm, points) = found?;
+    let compared = |a: &Step, b: &Step, found: Option<StepComparison>| {
+        let StepComparison { rms: [rms_mm, than_rms_mm], points, .. } = found?;
         Some(Withdrawn { step: a.id.clone(), rms_mm, than: b.id.clone(), than_rms_mm, points })
     };
     let mut stands = 0;
@@ -184,7 +205,8 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
     let guard = |step: &Step| -> ErrorsByRow {
         step.unseen.held_out.iter().filter(|(row, _)| never.contains(row)).map(|(row, error)| (*row, *error)).collect()
     };
-    let better = steps[..stands].iter().filter_map(|step| compared(chosen, step, worse(&guard(chosen), &guard(step))));
+    let against = |step: &Step| worse(&guard(chosen), &guard(step)).filter(|found| found.contradicts(stands));
+    let better = steps[..stands].iter().filter_map(|step| compared(chosen, step, against(step)));
     let contradicted = better.min_by(|a, b| a.than_rms_mm.total_cmp(&b.than_rms_mm)).map(Contradicted);
     Some(Standing { step: chosen.id.clone(), model: model.id.clone(), withdrawn, contradicted })
 }
@@ -268,6 +290,31 @@ mod tests {
         assert_eq!((agreed.contradicted, &against.withdrawn), (None, &Vec::new()));
         let Contradicted(found) = against.contradicted.expect("a contradiction");
         assert_eq!((found.step.as_str(), found.than.as_str(), found.points), ("diagnose", "geometry", 40));
+    }
+
+    #[test]
+    fn steps_that_differ_by_chance_are_contradicted_once_in_a_thousand_runs() {
+        // Three steps as good as each other at 25 points: noise of 18 um and 4 um of what each fit made of it, a step its own.
+        let mut state = 7_u64;
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut normal = move || (0..12).map(|_| even()).sum::<f64>() - 6.0;
+        let runs = 4000;
+        let mut contradicted = 0;
+        for _ in 0..runs {
+            let mut all = steps(&[("nominal", true, 0.3, 0.0), ("geometry", true, 0.2, 0.0), ("diagnose", true, 0.1, 0.0)], 55);
+            for row in 55..80 {
+                let noise = [0.018, 0.018, 0.018].map(|sigma| sigma * normal());
+                for step in &mut all {
+                    let square: f64 = noise.iter().map(|noise| (noise + 0.004 * normal()).powi(2)).sum();
+                    step.unseen.held_out.insert(row, square.sqrt());
+                }
+            }
+            contradicted += usize::from(standing(&all, Some("diagnose")).is_some_and(|found| found.contradicted.is_some()));
+        }
+        assert!(contradicted <= 8, "{contradicted} of {runs}");
     }
 
     #[test]

@@ -31,20 +31,22 @@ pub struct TorqueCourse {
 }
 
 impl TorqueCourse {
-    /// The courses of a diagnosis; `sequence` numbers its rows.
-    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: Vec<i64>) -> Self {
+    /// The courses of a diagnosis; `sequence` numbers its rows. Of rows of one number the first stands: the others were made up where rows of
+    /// the recording are missing.
+    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: &[i64]) -> Self {
         let courses = &diagnosis.courses;
+        let rows: Vec<usize> = (0..sequence.len()).filter(|row| *row == 0 || sequence[row - 1] != sequence[*row]).collect();
         Self {
             joints,
-            sequence,
-            time: courses.time.clone(),
-            held_out: courses.held_out.clone(),
-            in_event: courses.in_event.clone(),
-            rest: courses.at_rest.clone(),
-            velocity: courses.velocity.clone(),
-            measured: courses.measured.clone(),
-            simulated: courses.simulated.clone(),
-            corrected: courses.corrected.clone(),
+            sequence: kept(sequence, 1, &rows),
+            time: kept(&courses.time, 1, &rows),
+            held_out: kept(&courses.held_out, 1, &rows),
+            in_event: kept(&courses.in_event, 1, &rows),
+            rest: kept(&courses.at_rest, joints, &rows),
+            velocity: kept(&courses.velocity, joints, &rows),
+            measured: kept(&courses.measured, joints, &rows),
+            simulated: kept(&courses.simulated, joints, &rows),
+            corrected: kept(&courses.corrected, joints, &rows),
         }
     }
 
@@ -100,6 +102,11 @@ impl Table for TorqueCourse {
             corrected: all("corrected{j}_nm")?,
         })
     }
+}
+
+/// Some rows of row-major values.
+fn kept<T: Copy>(values: &[T], width: usize, rows: &[usize]) -> Vec<T> {
+    rows.iter().flat_map(|row| &values[row * width..(row + 1) * width]).copied().collect()
 }
 
 /// Columns of equal length -> row-major.

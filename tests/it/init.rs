@@ -3,6 +3,7 @@
 mod foreign;
 mod layouts;
 mod lists;
+mod torques;
 
 use crate::compensate::calib;
 use std::fmt::Write;

@@ -4,8 +4,9 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
+use calib::diagnose::{Diagnosis, Question, diagnose};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Poses, align, fit, spread};
-use calib::robot::{Measurements, PointReadings, RobotModel};
+use calib::robot::{Measurements, NoiseBasis, PointReadings, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{Observability, Parameters, Split};
 use nalgebra::Vector3;
@@ -99,6 +100,59 @@ fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
     let (data, _) = visited(40, 2, 1, 0.0, 10);
     let (ratio, chance) = identify(&data, &GEOMETRY).1.repeated.and_then(|repeated| repeated.lack_of_fit).expect("repeats");
     assert!(ratio > 10.0 && chance < 1e-9, "F {ratio}, p {chance:e}");
+}
+
+/// What a diagnosis of all rows says, with standard deviations of points stated so many times too large.
+fn diagnosed(data: &Measurements, stated: f64) -> Diagnosis {
+    let robot = RobotModel::new(fixture::offset_wrist());
+    let mut data = data.clone();
+    data.points.sigma.iter_mut().for_each(|sigma| *sigma *= stated);
+    let fit: Vec<usize> = (0..data.rows()).collect();
+    let question = Question {
+        robot: &robot,
+        data: &data,
+        fit: &fit,
+        validate: &[],
+        set: &vec![0; data.rows()],
+        prior_weight: 1.0,
+        open_world: 0.3,
+        without: &[],
+        own: &[],
+        beside_simulation: false,
+        seed: 1,
+    };
+    diagnose(&question, |_| ())
+}
+
+#[test]
+fn shots_of_a_standing_arm_show_the_noise_however_it_is_stated() {
+    let (data, _) = visited(60, 1, 3, 0.0, 21);
+    for stated in [6.0, 1.0, 1.0 / 6.0] {
+        let found = diagnosed(&data, stated);
+        let floor = found.noise_floor / (SIGMA * f64::sqrt(3.0));
+        assert!((floor - 1.0).abs() < 0.12, "stated {stated:.2} times: {floor:.3} of the noise");
+        assert_eq!((found.noise_basis, found.repeatability.repeats), (NoiseBasis::Repeats, 120));
+    }
+}
+
+#[test]
+fn returns_add_the_joints_to_the_noise_that_shots_show() {
+    let (data, _) = visited(40, 3, 3, 5.0 * ARCSEC, 22);
+    let found = diagnosed(&data, 6.0);
+    let joints = found.repeatability.sigma / (5.0 * ARCSEC);
+    assert!((joints - 1.0).abs() < 0.15 && found.noise_floor > 2.0 * SIGMA, "{joints:.3}, {:e}", found.noise_floor);
+    assert_eq!(found.noise_basis, NoiseBasis::Repeats);
+}
+
+#[test]
+fn what_a_model_leaves_at_a_pose_is_no_correlated_noise_for_being_measured_three_times() {
+    let (mut data, _) = visited(80, 1, 3, 0.0, 23);
+    for (row, point) in data.points.position.iter_mut().enumerate() {
+        *point += Vector3::from_fn(|axis, _| 4.0 * SIGMA * normal(5_000_011 + 3 * (row / 3) + axis));
+    }
+    let found = diagnosed(&data, 1.0);
+    let said = found.not_observable.join("; ");
+    assert!(!said.contains("correlated"), "{said}");
 }
 
 /// Scatter over reported sigma of the ratios of so many robots, and their mean sigma.

@@ -3,7 +3,7 @@
 use super::Unit;
 
 /// What is written, in small letters, and what it means.
-const WRITTEN: [(&str, Unit); 30] = [
+const WRITTEN: [(&str, Unit); 31] = [
     ("mm", Unit::Millimetre),
     ("millimeter", Unit::Millimetre),
     ("m", Unit::Metre),
@@ -33,6 +33,7 @@ const WRITTEN: [(&str, Unit); 30] = [
     ("sec", Unit::Second),
     ("ms", Unit::Millisecond),
     ("a", Unit::Ampere),
+    ("ma", Unit::Milliampere),
     ("nm", Unit::NewtonMetre),
 ];
 

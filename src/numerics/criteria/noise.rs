@@ -16,6 +16,8 @@ criteria! {
     FEW: usize = 4, "repeats", "count: a standard deviation known to a third", "";
     /// A squared whitened error counts at most this much.
     CAP: f64 = 30.0, "squared standard deviations", "count: five and a half, beyond any normal row", "";
+    /// The median of the squared length of three normal numbers: repeats by their usual one, which mistakes among them do not move.
+    MEDIAN: f64 = 2.366, "squared standard deviations", "count: chi-square with three degrees of freedom", "";
     /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
     SEARCHED: usize = 800, "rows", "judgement: bounds time", "";
     /// Rows that count as fewer than this are independent.

@@ -3,8 +3,9 @@
 use super::types::Question;
 use super::words::Ground;
 use crate::criteria::noise::{MAX_CHI_SQUARE, MAX_CHI_SQUARE_OF_STRUCTURE};
+use crate::criteria::search::SIGNIFICANT;
 use crate::effect::PlacementBuffers;
-use crate::estimate::{Model, Screening, noise};
+use crate::estimate::{Model, Screening, noise, tail};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_brought};
 use crate::robot::{Measurements, NoiseBasis};
 use rayon::prelude::*;
@@ -81,7 +82,10 @@ impl Misfit {
         let freedom = values(kept).saturating_sub(parameters).max(1) as f64;
         // Rows that were not fitted also see the errors of what was.
         let inflation = 1.0 + parameters as f64 / freedom;
-        let not_carried = held_out && whitened(&judges) > *MAX_CHI_SQUARE * inflation * values(&judges) as f64;
+        let ratio = whitened(&judges) / (inflation * values(&judges).max(1) as f64);
+        // Few points are that far off by chance.
+        let chance = tail(ratio, values(&judges) as f64, freedom);
+        let not_carried = held_out && ratio > *MAX_CHI_SQUARE && chance < *SIGNIFICANT;
         let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
         let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();

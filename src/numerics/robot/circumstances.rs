@@ -29,7 +29,7 @@ pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
         "Which trajectory of several a row belongs to, of an arm that moves: nothing is filtered from one into the next.",
     ),
     DeclaredColumn::text("target", "Which of several targets on the tool was measured; blank for the robot's tool point."),
-    DeclaredColumn::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
+    DeclaredColumn::number("time", &["time"], Time, [-1e15, 1e15], "When the row was recorded."),
     DeclaredColumn::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
     DeclaredColumn::number("temperature", &["temp"], Temperature, [-60.0, 200.0], "Temperature of the arm or of the room."),
     DeclaredColumn::number("humidity", &["humidity"], Number, [0.0, 100.0], "Relative humidity of the air, percent; no unit.")

@@ -4,6 +4,7 @@
 
 use super::batches::{BatchReader, Batches, broken};
 use super::layout::FileLayout;
+use super::lists::unfolded;
 use super::record::{Buffered, FileFormat, RecordReader, failed};
 use crate::error::{Error, Result};
 use crate::raw;
@@ -18,7 +19,12 @@ const SECOND: &[u8] = b"ARROW1";
 pub(super) const FORMAT: FileFormat =
     FileFormat { is: |_, head| head.starts_with(FIRST) || head.starts_with(SECOND), has_sheets: false, open };
 
-fn open(mut source: Buffered, label: &str, _layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+fn open(source: Buffered, label: &str, _layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+    Ok(Box::new(read(source, label)?))
+}
+
+/// Opens it; fails where it cannot be read.
+pub(super) fn read(mut source: Buffered, label: &str) -> Result<BatchReader> {
     let mut content = Vec::new();
     source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
     if content.starts_with(FIRST) {
@@ -38,7 +44,7 @@ fn open(mut source: Buffered, label: &str, _layout: &FileLayout) -> Result<Box<d
         whole = matches!(batch, Some(Ok(_)));
         batch
     });
-    Ok(Box::new(BatchReader::new(label, WHAT, Batches { schema, size, rows: None, batches: Box::new(batches) })))
+    Ok(BatchReader::new(label, WHAT, unfolded(Batches { schema, size, rows: None, batches: Box::new(batches) })))
 }
 
 /// What the decoder says, and what to do where the file is compressed in a way that it does not know.

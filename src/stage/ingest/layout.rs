@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
     /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
-    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a flat file of columns (Parquet; Feather uncompressed or by zstd), for which only `columns` matters.
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a file of columns (Parquet; Feather uncompressed or by zstd), for which only
+    /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on.
     pub file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -8,7 +8,7 @@ use super::fields::{Delimiter, delimiter, split, unquote};
 use super::layout::FileLayout;
 use super::record::{BUFFER, Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Result};
-use crate::raw::{Utf16Reader, is_utf16};
+use crate::raw::{Utf16Reader, is_utf16, not_read};
 use memchr::{memchr, memchr_iter};
 use std::io::{BufRead, BufReader, Cursor, Read};
 
@@ -22,7 +22,11 @@ const BLOCK: usize = 1 << 18;
 pub(super) const FORMAT: FileFormat = FileFormat { is: |_, _| true, has_sheets: false, open };
 
 fn open(mut source: Buffered, label: &str, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
-    if is_utf16(source.fill_buf().map_err(|error| failed(label, &error))?) {
+    let head = source.fill_buf().map_err(|error| failed(label, &error))?;
+    if let Some(what) = not_read(head) {
+        return Err(Error::data(label, what));
+    }
+    if is_utf16(head) {
         let text: Box<dyn Read + Send> = Box::new(Utf16Reader::new(source));
         source = BufReader::with_capacity(BUFFER, text);
     }

@@ -116,7 +116,7 @@ impl<'a, 'b> Ahead<'a, 'b> {
         context: &Context<'a>,
         writes: bool,
     ) -> Result<Self> {
-        let names = super::names(scans.iter());
+        let names = super::names(scans.iter().map(|scan| scan.label.as_str()));
         let decided = JoinDecisions { settings, arm, scans: &scans, decisions: &[], names: &names };
         let chunks = if writes { Some(RecordingChunks::new(&[decided], context)?) } else { None };
         let rejected = scans.iter().map(|_| Vec::new()).collect();

@@ -9,12 +9,12 @@ use super::record::{BUFFER, FileFormat, RecordFields, RecordReader, failed};
 use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
 use super::row::RowReader;
-use super::{lines, listing, parquet, workbook};
+use super::{feather, lines, listing, parquet, workbook};
 use crate::error::{Error, Result, counted};
 use crate::raw;
 use crate::stage::{Context, OpenedInput};
 use crate::table::RejectedRow;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use std::sync::Arc;
 const STRIDE: u64 = 4096;
 
 /// Every kind of file; the first that a file is, text at last.
-const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &super::feather::FORMAT, &lines::FORMAT];
+const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &feather::FORMAT, &lines::FORMAT];
 
 /// Opens a file of any kind.
 fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
@@ -35,6 +35,32 @@ fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader
         return Err(Error::data(&source.label, message));
     }
     (format.open)(reader, &source.label, layout)
+}
+
+/// Names of the columns and the first rows, up to `most`, of a file of columns; none of a file of another kind.
+pub fn first_rows(source: Box<dyn Read + Send>, label: &str, most: usize) -> Result<Option<FirstRows>> {
+    let mut reader = BufReader::with_capacity(BUFFER, source);
+    let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
+    let mut rows = match () {
+        () if (parquet::FORMAT.is)("", head) => parquet::read(reader, label)?,
+        () if (feather::FORMAT.is)("", head) => feather::read(reader, label)?,
+        () => return Ok(None),
+    };
+    let mut record = RecordFields::default();
+    let mut found = Vec::new();
+    while found.len() <= most && rows.next(&mut record)? {
+        let cell = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
+        found.push((0..record.len()).map(cell).collect::<Vec<String>>());
+    }
+    Ok(Some(FirstRows { names: found.remove(0), rows: found }))
+}
+
+/// How a file of columns begins.
+pub struct FirstRows {
+    /// Of the columns.
+    pub names: Vec<String>,
+    /// Their cells, as text.
+    pub rows: Vec<Vec<String>>,
 }
 
 /// An opened file below its header.

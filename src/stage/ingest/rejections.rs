@@ -20,11 +20,23 @@ impl<'a> Rejections<'a> {
         Ok(Self { sink: context.services.sink(Rejected::KIND)?, rows: Vec::new(), ordered: names.is_sorted() })
     }
     pub(super) fn push(&mut self, row: RejectedRow) -> Result<()> {
+        let goes_on = self.rows.last().is_some_and(|last| (&last.file, last.line) == (&row.file, row.line));
+        if self.ordered && self.rows.len() >= REJECTED_CHUNK && !goes_on {
+            self.flush()?;
+        }
         self.rows.push(row);
-        if self.ordered && self.rows.len() >= REJECTED_CHUNK { self.flush() } else { Ok(()) }
+        Ok(())
     }
     fn flush(&mut self) -> Result<()> {
         self.rows.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
+        // A program may declare several positions in one line.
+        self.rows.dedup_by(|next, kept| {
+            let same = (&next.file, next.line) == (&kept.file, kept.line);
+            if same {
+                kept.detail.push_str(&format!("; {}", next.detail));
+            }
+            same
+        });
         self.sink.push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
     }
     pub(super) fn finish(mut self) -> Result<StreamedTable<Rejected>> {

@@ -18,6 +18,8 @@ use std::sync::Arc;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
+/// Numbers of rows go up to here: the targets of wide rows have room beyond.
+const LARGEST_SEQUENCE: i64 = 1 << 52;
 
 /// Reads rows of one file.
 #[derive(Clone)]
@@ -291,6 +293,9 @@ impl RowReader {
         let Ok(value) = shown.parse::<i64>() else {
             return refuse(Reason::NotANumber, format!("sequence: `{shown}` is not a whole number"));
         };
+        if value.abs() > LARGEST_SEQUENCE {
+            return refuse(Reason::OutOfRange, format!("sequence {value} is out of range; allowed: up to {LARGEST_SEQUENCE}"));
+        }
         if let Some(last) = self.last_sequence
             && value <= last
         {

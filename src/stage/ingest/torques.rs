@@ -17,7 +17,6 @@ use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 use std::sync::Arc;
 
 /// Reads recordings of joint torques or motor currents of a moving arm.
@@ -78,7 +77,7 @@ writes! {
 impl Stage for IngestTorques {
     const NAME: &'static str = "ingest_torques";
     const SUMMARY: &'static str = "reads joint positions with torques or motor currents of an arm that moves";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = IngestTorquesReads;
     type Writes = IngestTorquesWrites;
 
@@ -130,7 +129,8 @@ impl Stage for IngestTorques {
             return Err(Error::Spec(faults));
         }
         let arm = Arc::new(RobotJoints::of(&reads.robot)?);
-        let names: Vec<String> = self.files.iter().map(|file| own_name(&file.file.0)).collect();
+        let labels: Vec<String> = self.files.iter().map(|file| file.file.0.display().to_string()).collect();
+        let names = super::names(labels.iter().map(String::as_str));
         let mut rejected = Rejections::new(&names, context)?;
         let mut rows = MotionRows::new(self, &reads.robot, &arm, context)?;
         let mut intake = Vec::new();
@@ -140,10 +140,6 @@ impl Stage for IngestTorques {
         intake.sort_by(|a: &IntakeRow, b| a.file.cmp(&b.file));
         Ok(IngestTorquesWrites { motion: rows.finish(context)?, rejected: rejected.finish()?, intake: Intake(intake) })
     }
-}
-
-fn own_name(path: &Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The table of motion, chunk by chunk.

@@ -1,7 +1,9 @@
 //! Joint positions that a controller's program declares are the joint file of a recording.
 
-use super::{refusal, robot, take};
-use crate::desk::Desk;
+use super::{refusal, robot, settings, take};
+use crate::desk::{Desk, table};
+use calib::stage::ingest::IngestReads;
+use calib::table::{Intake, Rejected, RejectedRow};
 
 const RAPID: &str = "MODULE Measure
   ! the poses of Monday
@@ -52,6 +54,17 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
     assert_eq!(degrees(taken.recording.q(0)), [0.0, -12.5, 20.0, 0.0, 30.0, -90.0]);
     assert_eq!(taken.recording.position[0], [0.007, 0.008, 0.016]);
     assert!(desk.notes.lock().expect("notes").iter().any(|note| note == "cell.MOD: 1 pose without joints left out"));
+}
+
+#[test]
+fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
+    let desk = desk("cell.MOD", RAPID, "p10,7,8,16\n");
+    let yaml = joined("cell.MOD", "rax_#") + "max_rejected_fraction: 0.9\n";
+    let tables = desk.run(&settings(&yaml), IngestReads { robot: robot("rrrrrr", 1.0) }).expect("tables");
+    let rejected: Vec<RejectedRow> = table::<Rejected>(&tables).into_iter().flat_map(|chunk| chunk.0).collect();
+    let told: Vec<(i64, usize)> = rejected.iter().map(|row| (row.line, row.detail.matches("no usable row").count())).collect();
+    assert_eq!(told, [(6, 2)], "{rejected:?}");
+    assert_eq!(table::<Intake>(&tables)[0].0.iter().map(|file| file.rejected).collect::<Vec<_>>(), [2, 0]);
 }
 
 #[test]

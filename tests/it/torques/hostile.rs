@@ -145,6 +145,44 @@ fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
     assert_eq!(code, 0, "{said}");
 }
 
+#[test]
+fn a_row_that_is_missing_at_a_low_rate_is_bridged_and_no_row_is_told_twice() {
+    // At 25 Hz every row of the clock is judged, one that is made up too.
+    let folder = tempfile::tempdir().expect("a folder");
+    let holed = |sheet: &mut Sheet| {
+        let mut number = 0..;
+        sheet.rows.retain(|_| number.next().is_some_and(|number: usize| number.is_multiple_of(2) && number != 196));
+    };
+    let (code, said) = told(holed, folder.path());
+    assert_eq!(code, 0, "{said}");
+}
+
+#[test]
+fn files_of_one_name_in_two_folders_are_told_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (case, sheet) = case("compact6");
+    write(folder.path(), &[case.recording()[0].clone()]);
+    let mut spoilt = Sheet { header: sheet.header.clone(), rows: sheet.rows.clone() };
+    let column = spoilt.column("q2_deg");
+    spoilt.rows[7][column] = "lost".into();
+    for (name, sheet) in [("one", &sheet), ("two", &spoilt), ("three", &spoilt)] {
+        write(&folder.path().join(name), &[("recording.csv", sheet.text())]);
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/dynamics/pipeline.yaml");
+    let text = std::fs::read_to_string(root).expect("a pipeline");
+    let (before, block) = text.split_once("        - file: ${case}/recording.csv\n").expect("a file");
+    let (columns, after) = block.split_once("\n\n").expect("columns");
+    let file = |name: &str| format!("        - file: {name}/recording.csv\n{columns}\n");
+    let all = ["one", "two", "three"].map(file).concat();
+    std::fs::write(folder.path().join("p.yaml"), format!("{}{all}\n{after}", before.replace("${case}/", ""))).expect("a file");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(["run", "p.yaml", "--until", "ingest_torques", "--quiet"])
+        .current_dir(folder.path())
+        .output()
+        .expect("calib");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 /// One way to spoil a recording: whose, how, the code, and words of the answer.
 type Spoiled = (&'static str, &'static str, fn(&mut Sheet), i32, &'static [&'static str]);
 

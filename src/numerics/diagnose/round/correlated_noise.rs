@@ -11,6 +11,7 @@ use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
+use crate::robot::Measurements;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
@@ -21,7 +22,7 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     if !fitter.may_estimate_correlation(settled) {
         return None;
     }
-    let rows = thinned(&fitter.data, &settled.screening.kept);
+    let rows = thinned(&fitter.data, &first_of_pose(&fitter.data, &settled.screening.kept));
     let problem = WhitenedProblem::new(&settled.model, &fitter.data, rows);
     // Rows that measured different numbers have no one correlation from each to the next.
     let width = problem.width()?;
@@ -47,6 +48,15 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
         }
     }
     (best < believed - *PLAIN && noise != fitter.correlated).then(|| change(noise))
+}
+
+/// Rows without those that measured a target again before the arm left the pose: what the model leaves there they share, whatever the noise does.
+fn first_of_pose(data: &Measurements, rows: &[usize]) -> Vec<usize> {
+    let again = |row: usize| {
+        let before = (0..data.rank_in_time(row)).rev().map(|place| data.at_place(place));
+        before.take_while(|other| data.near_pose(*other, row)).any(|other| data.target(other) == data.target(row))
+    };
+    rows.iter().copied().filter(|row| !again(*row)).collect()
 }
 
 fn follows_time(form: &Form) -> bool {

@@ -104,6 +104,8 @@ pub(crate) struct Fitter<'a> {
     spread: JointSpread,
     /// What repeats show of the joints' repeatability, rad: nothing of it rests on a residual.
     repeated: f64,
+    /// Whether shots of a standing arm showed the instrument's noise to be other than stated: of the joints they say nothing then.
+    scaled: bool,
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
     /// Autocorrelated noise of standing points; none where it is white.
@@ -125,6 +127,7 @@ impl<'a> Fitter<'a> {
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: JointSpread::default(),
             repeated: 0.0,
+            scaled: false,
             asked: false,
             correlated: None,
             estimated: 0,
@@ -134,14 +137,35 @@ impl<'a> Fitter<'a> {
         let mut now = fitter.fit(&base, Vec::new());
         fitter.free = Some(now.fitted.free());
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
-        let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
-        fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
+        let kept = &now.screening.kept;
+        let shown = RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
+        fitter.repeatability = shown.joints;
+        fitter.scaled = shown.scale != 1.0;
+        if fitter.scaled {
+            fitter.data.points.sigma.iter_mut().for_each(|sigma| *sigma *= shown.scale);
+            let returns = RepeatPairs::returns(&fitter.data, kept);
+            let by_returns = returns.map_or(0.0, |pairs| pairs.repeatability(&now.model, &fitter.data, &fitter.spread).sigma);
+            fitter.repeatability.sigma = fitter.repeatability.sigma.max(by_returns);
+        }
         fitter.repeated = fitter.repeatability.sigma;
-        if fitter.repeatability.sigma > 0.0 {
+        if fitter.repeatability.sigma > 0.0 || fitter.scaled {
             fitter.spread.put(&mut fitter.data, fitter.repeatability.sigma);
             now = fitter.fit(&base, Vec::new());
         }
         (fitter, now)
+    }
+
+    /// Repeats that say how well the joints repeat; none where they are too few, or the arm stood between them.
+    fn repeats(&self, rows: &[usize]) -> Option<RepeatPairs> {
+        match self.scaled {
+            true => RepeatPairs::returns(&self.data, rows),
+            false => (self.repeatability.repeats >= *REPEATS).then(|| RepeatPairs::of(&self.data, rows)),
+        }
+    }
+
+    /// Whether the joints' repeatability rests on what a model leaves.
+    pub fn infers_repeatability(&self, rows: &[usize]) -> bool {
+        self.repeatability.sigma > self.repeated && self.repeats(rows).is_none()
     }
 
     /// Base parameters that are estimated.
@@ -153,7 +177,7 @@ impl<'a> Fitter<'a> {
     /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
     pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
         let FitState { model, fitted, screening, .. } = settled;
-        let pairs = (self.repeatability.repeats >= *REPEATS).then(|| RepeatPairs::of(&self.data, &screening.kept));
+        let pairs = self.repeats(&screening.kept);
         if self.asked || pairs.as_ref().is_some_and(|pairs| !pairs.are_returns) {
             return None;
         }

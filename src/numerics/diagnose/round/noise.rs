@@ -1,17 +1,22 @@
-//! How well the joints repeat: one standard deviation for all, by maximum likelihood on repeats or on a residual without structure.
+//! The noise that repeats show: by how much the instrument's differs from its statement, and how well the joints repeat, one standard deviation
+//! for all, by maximum likelihood on repeats or on a residual without structure.
 
-use crate::criteria::noise::{CAP, FEW, REPEATS};
+use crate::criteria::noise::{CAP, CLEARER, FEW, MEDIAN, REPEATS, SETTLED};
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model, Poses};
 use crate::observation::{MeasurementKind, PointKind, Residual, kinds, values};
 use crate::robot::Measurements;
+use crate::statistics::nearest;
 use nalgebra::{Matrix3, Vector3};
 
 /// Standard deviations tried, rad.
 const LOWEST: f64 = 5e-7;
 const HIGHEST: f64 = 3e-4;
 const STEPS: usize = 60;
+/// Scales of the stated noise that are tried, a third as many, as shares of that of the usual repeat: joints may have a part in it.
+const SMALLEST: f64 = 0.28;
+const LARGEST: f64 = 1.2;
 
 /// Covariances per squared deviation of every joint, by row.
 #[derive(Default)]
@@ -91,6 +96,22 @@ struct LeftBySpread {
     varying: Matrix3<f64>,
 }
 
+/// What repeats show of the noise.
+pub(super) struct RepeatedNoise {
+    /// By what the stated standard deviations of points are multiplied.
+    pub scale: f64,
+    pub joints: JointRepeatability,
+}
+
+/// A repeat: what it is off by, with its covariance.
+struct Sample {
+    error: Vector3<f64>,
+    /// Of the instrument.
+    fixed: Matrix3<f64>,
+    /// By the joints, per squared deviation.
+    varying: Matrix3<f64>,
+}
+
 /// Pairs of rows that measured one target in one pose again.
 pub(super) struct RepeatPairs {
     pairs: Vec<[usize; 2]>,
@@ -101,9 +122,30 @@ pub(super) struct RepeatPairs {
 impl RepeatPairs {
     /// Right after each other, where those are enough; else also returns, those after a shorter time, which drifts spoil least.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
+        let [mut pairs, mut returns] = Self::all(data, rows);
+        if pairs.len() >= *REPEATS || returns.is_empty() {
+            pairs.sort_unstable_by_key(|pair| pair[1]);
+            return Self { pairs, are_returns: false };
+        }
+        shortest(&mut returns);
+        pairs.extend(returns);
+        pairs.sort_unstable_by_key(|pair| pair[1]);
+        Self { pairs, are_returns: true }
+    }
+
+    /// Returns alone; none where they are too few.
+    pub fn returns(data: &Measurements, rows: &[usize]) -> Option<Self> {
+        let [_, mut returns] = Self::all(data, rows);
+        shortest(&mut returns);
+        returns.sort_unstable_by_key(|pair| pair[1]);
+        (returns.len() >= *FEW).then_some(Self { pairs: returns, are_returns: true })
+    }
+
+    /// Those right after each other, and those between which the arm was elsewhere.
+    fn all(data: &Measurements, rows: &[usize]) -> [Vec<[usize; 2]>; 2] {
         if data.in_motion(rows) {
             // Rows of a halt tell nothing of what the joints do on the way.
-            return Self { pairs: Vec::new(), are_returns: false };
+            return [Vec::new(), Vec::new()];
         }
         let poses = Poses::of(data, rows);
         let others = without_points(data, &poses);
@@ -112,18 +154,51 @@ impl RepeatPairs {
         let at_once = |[a, b]: &[usize; 2]| {
             let [from, to] = [data.rank_in_time(*a), data.rank_in_time(*b)];
             let mut between = (from.min(to) + 1..from.max(to)).map(|place| data.at_place(place));
-            between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
+            between.all(|k| data.near_pose(*a, k))
         };
-        let (mut pairs, mut returns): (Vec<[usize; 2]>, Vec<[usize; 2]>) = pairs.partition(at_once);
-        if pairs.len() >= *REPEATS || returns.is_empty() {
-            pairs.sort_unstable_by_key(|pair| pair[1]);
-            return Self { pairs, are_returns: false };
+        let (at_once, returns) = pairs.partition(at_once);
+        [at_once, returns]
+    }
+
+    /// What the pairs show of the instrument's noise, with the joints' repeatability at that: where they follow each other at once, are enough,
+    /// and speak clearly for another noise than the stated one.
+    pub fn noise(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> RepeatedNoise {
+        let joints = self.repeatability(model, data, spread);
+        let stated = RepeatedNoise { scale: 1.0, joints };
+        let samples = self.of_points(model, data, spread);
+        let Some(shown) = scale_of(&samples).filter(|_| !self.are_returns && samples.len() >= *REPEATS) else { return stated };
+        // Mistakes speak for no noise.
+        let usual: Vec<Sample> = samples.into_iter().filter(|one| one.square() < *CAP * shown * shown).collect();
+        let deviance = |scale: f64, sigma: f64| usual.iter().map(|one| one.deviance(scale, sigma)).sum::<f64>();
+        let best_joints = |scale: f64| {
+            let all = std::iter::once(0.0).chain(deviations()).map(|sigma| (deviance(scale, sigma), sigma));
+            all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.0))
+        };
+        let scales = grid(SMALLEST * shown, LARGEST * shown, STEPS / 3);
+        let best = scales.map(|scale| (best_joints(scale).0, scale)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((cost, scale)) = best else { return stated };
+        let differs = (scale - 1.0).abs() > *SETTLED * scale.max(1.0);
+        if !differs || cost > best_joints(1.0).0 - *CLEARER {
+            return stated;
         }
-        returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
-        returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
-        pairs.extend(returns);
-        pairs.sort_unstable_by_key(|pair| pair[1]);
-        Self { pairs, are_returns: true }
+        let scaled: Vec<Sample> = usual.into_iter().map(|one| Sample { fixed: one.fixed * (scale * scale), ..one }).collect();
+        RepeatedNoise { scale, joints: JointRepeatability { sigma: likeliest(&scaled, 2.0), ..joints } }
+    }
+
+    /// What points differ by beyond the motion that `model` knows between them.
+    fn of_points(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> Vec<Sample> {
+        let predicted = model.predict(data);
+        let one = |[a, b]: &[usize; 2]| {
+            let variance = |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
+            let known =
+                if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
+            Some(Sample {
+                error: data.point(*b)? - data.point(*a)? - known,
+                fixed: variance(*a) + variance(*b),
+                varying: spread.points[*b] * 2.0,
+            })
+        };
+        self.pairs.iter().filter_map(one).collect()
     }
 
     /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
@@ -132,19 +207,16 @@ impl RepeatPairs {
         if repeats < *FEW {
             return JointRepeatability { sigma: 0.0, repeats };
         }
-        let predicted = model.predict(data);
-        let one = |[a, b]: &[usize; 2]| {
-            let variance = |row: usize| Matrix3::from_diagonal(&data.points.sigma[row].map(|s| s * s));
-            let known =
-                if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
-            Some((data.point(*b)? - data.point(*a)? - known, variance(*a) + variance(*b), spread.points[*b] * 2.0))
-        };
-        let mut samples: Vec<_> = self.pairs.iter().filter_map(one).collect();
+        let mut samples = self.of_points(model, data, spread);
         for [a, b] in self.pairs.iter().filter(|[a, b]| data.anchor(*a) == data.anchor(*b)) {
             let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
             let both = to.iter().filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
             // On lines that hold nothing the error is none and the variance a constant.
-            samples.extend(both.map(|(from, to)| (to.error - from.error, from.fixed + to.fixed, from.varying + to.varying)));
+            samples.extend(both.map(|(from, to)| Sample {
+                error: to.error - from.error,
+                fixed: from.fixed + to.fixed,
+                varying: from.varying + to.varying,
+            }));
         }
         JointRepeatability { sigma: likeliest(&samples, 2.0), repeats }
     }
@@ -175,18 +247,55 @@ pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: 
     let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
         let residual = data.point(*row)? - predicted[*row];
-        Some((residual * freedom, Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s)), spread.points[*row]))
+        let fixed = Matrix3::from_diagonal(&data.points.sigma[*row].map(|s| s * s));
+        Some(Sample { error: residual * freedom, fixed, varying: spread.points[*row] })
     };
     let mut samples: Vec<_> = rows.iter().filter_map(one).collect();
     let others = spread.beside_points(model, data, rows).into_iter();
-    samples.extend(others.map(|left| (left.error * freedom, left.fixed, left.varying)));
+    samples.extend(others.map(|left| Sample { error: left.error * freedom, fixed: left.fixed, varying: left.varying }));
     likeliest(&samples, 6.0)
 }
 
+/// Returns after the shortest times, half of them.
+fn shortest(returns: &mut Vec<[usize; 2]>) {
+    returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
+    returns.truncate(returns.len().div_ceil(2).max(*REPEATS));
+}
+
+/// By what stated standard deviations are multiplied for the usual sample to be as far off as it is; none without samples.
+fn scale_of(samples: &[Sample]) -> Option<f64> {
+    let mut squares: Vec<f64> = samples.iter().map(Sample::square).collect();
+    nearest(&mut squares, 0.5).map(|median| (median / *MEDIAN).sqrt()).filter(|scale| *scale > 0.0)
+}
+
+/// Standard deviations of the joints that are tried, rad.
+fn deviations() -> impl Iterator<Item = f64> {
+    grid(LOWEST, HIGHEST, STEPS)
+}
+
+/// So many numbers from one to another, each the same share larger.
+fn grid(least: f64, greatest: f64, count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| least * libm::pow(greatest / least, k as f64 / (count - 1) as f64))
+}
+
+impl Sample {
+    /// Squared, in the instrument's stated standard deviations.
+    fn square(&self) -> f64 {
+        self.fixed.try_inverse().map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)))
+    }
+
+    /// -2 ln of its likelihood, up to a constant.
+    fn deviance(&self, scale: f64, sigma: f64) -> f64 {
+        let covariance = self.fixed * (scale * scale) + self.varying * (sigma * sigma);
+        let square = covariance.try_inverse().map_or(*CAP, |inverse| self.error.dot(&(inverse * self.error)));
+        square + covariance.determinant().ln()
+    }
+}
+
 /// The likeliest deviation; none unless it is better than none by `evidence`.
-fn likeliest(samples: &[(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)], evidence: f64) -> f64 {
+fn likeliest(samples: &[Sample], evidence: f64) -> f64 {
     let cost = |sigma: f64| -> f64 {
-        let one = |(error, fixed, varying): &(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)| {
+        let one = |Sample { error, fixed, varying }: &Sample| {
             let covariance = fixed + varying * (sigma * sigma);
             let square = covariance.try_inverse().map_or(*CAP, |inverse| error.dot(&(inverse * error)));
             square.min(*CAP) + covariance.determinant().ln()
@@ -194,7 +303,6 @@ fn likeliest(samples: &[(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)], evidence: f
         samples.iter().map(one).sum()
     };
     let none = cost(0.0);
-    let steps = (0..STEPS).map(|k| LOWEST * libm::pow(HIGHEST / LOWEST, k as f64 / (STEPS - 1) as f64));
-    let best = steps.map(|sigma| (cost(sigma), sigma)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = deviations().map(|sigma| (cost(sigma), sigma)).min_by(|a, b| a.0.total_cmp(&b.0));
     best.filter(|(cost, _)| *cost < none - evidence).map_or(0.0, |(_, sigma)| sigma)
 }

@@ -25,7 +25,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &model, state.fitted.singular.len());
-    let basis = basis(fitter);
+    let basis = basis(fitter, &state.screening.kept);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= *SIGNIFICANT);
@@ -115,10 +115,10 @@ fn within(mut findings: Vec<Finding>, model: &Model) -> Vec<Finding> {
 }
 
 /// What the noise rests on: enough repeats, or what is stated where that is all of it.
-fn basis(fitter: &Fitter) -> NoiseBasis {
+fn basis(fitter: &Fitter, rows: &[usize]) -> NoiseBasis {
     let JointRepeatability { sigma, repeats } = fitter.repeatability;
     match fitter.data.noise_basis {
-        _ if repeats >= *REPEATS => NoiseBasis::Repeats,
+        _ if repeats >= *REPEATS && !fitter.infers_repeatability(rows) => NoiseBasis::Repeats,
         _ if sigma > 0.0 => NoiseBasis::Inferred,
         stated => stated,
     }
