@@ -1,6 +1,6 @@
 //! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should separate.
 
-use super::pool::{CachedHypotheses, HypothesisSet};
+use super::pool::HypothesisSet;
 use super::round::compliance;
 use super::whitened::WhitenedProblem;
 use crate::criteria::search::RIVAL_LEVELS;
@@ -50,7 +50,7 @@ pub fn discrimination_problem(
     let rivals = rivals(&survey, model, (effect, place), finding)?;
     let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let mut pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &open, 1.0, rivals));
+    let mut pool = HypothesisSet::new(&problem, &jacobian, &open, rivals);
     let Some((_, mut best)) = best(&pool, 0) else { return Err(format!("no form of {effect} at {place} can be tried")) };
     for level in 0..*RIVAL_LEVELS {
         let own = pool.hypotheses[best].clone();
@@ -72,13 +72,13 @@ pub fn discrimination_problem(
 }
 
 /// How well one form fits, with a penalty for every parameter.
-fn score(pool: &CachedHypotheses, k: usize) -> f64 {
+fn score(pool: &HypothesisSet, k: usize) -> f64 {
     let (solution, rows) = (pool.solve(&[k]), pool.residual_rows as f64);
     rows * ((pool.square - solution.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * solution.rank as f64
 }
 
 /// The best of the forms from `first` on, with its score.
-fn best(pool: &CachedHypotheses, first: usize) -> Option<(f64, usize)> {
+fn best(pool: &HypothesisSet, first: usize) -> Option<(f64, usize)> {
     (first..pool.hypotheses.len()).map(|k| (score(pool, k), k)).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 

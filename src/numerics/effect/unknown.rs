@@ -272,7 +272,6 @@ impl Cause for Unknown {
         if !moves.is_empty() || curve && term.law().times.is_some() {
             return format!("{moves}{}{shape}", names.join("_"));
         }
-        let frame = !matches!(term.motion(), Motion::Joint { .. });
         match (term.basis(), term.law().first.of) {
             (Basis::Hinge { .. }, _) => "hinge".into(),
             (Basis::Bump { .. }, _) => "bump".into(),

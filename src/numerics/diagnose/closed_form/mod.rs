@@ -9,7 +9,7 @@ mod grammar;
 mod shape_sigma;
 
 use super::judge::{Alternatives, FoldErrors};
-use super::pool::{Beside, CachedHypotheses};
+use super::pool::{Beside, HypothesisSet};
 use super::round::{EstimatedCause, FitState, Fitter};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
@@ -22,7 +22,7 @@ use shape_sigma::shape_sigmas;
 pub(super) struct FormulaSearch<'a, 'b> {
     pub state: &'b FitState,
     pub set: &'b [usize],
-    pub pool: &'b CachedHypotheses<'a>,
+    pub pool: &'b HypothesisSet<'a>,
     pub survey: &'b Survey<'a>,
     pub fitter: &'b Fitter<'b>,
 }

@@ -1,7 +1,7 @@
 //! Models with causes left out or with another one, judged by folds of the rows in a linear picture: an effect is small, so that its
 //! coefficients change the points in proportion. What is to change the model is fitted afterwards.
 
-use super::fold_errors::{FoldErrors, folds, stretches};
+use super::fold_errors::{FoldErrors, folds};
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter, with_causes};
 use crate::estimate::{Model, NearbyFits, Session};
 use std::ops::Range;
@@ -25,11 +25,6 @@ impl<'a> Alternatives<'a> {
         let causes: Vec<EstimatedCause> = state.causes.iter().cloned().chain(rivals.iter().map(at_zero)).collect();
         let (model, ranges) = with_causes(&state.model, &causes);
         Some(Self { state, fitter, model, ranges, folds: folds(state, fitter)? })
-    }
-
-    /// The same without rivals, where each fold is a stretch of the recording.
-    pub fn of_stretches(state: &'a FitState, fitter: &'a Fitter) -> Option<Self> {
-        Some(Self { folds: stretches(state, fitter)?, ..Self::of(state, fitter, &[])? })
     }
 
     /// The fits around the state; none where bounds are in the way.
@@ -65,7 +60,7 @@ impl NearAlternatives<'_> {
     /// the state.
     pub fn errors(&self, out: &[usize], rival: Option<usize>) -> Option<FoldErrors> {
         let errors: Option<Vec<Vec<f64>>> = self.nearby.with(&self.steps(out, rival))?.into_iter().collect();
-        Some(FoldErrors::gathered(&self.session, &self.of.folds, &errors?, self.of.fitter.scale))
+        Some(FoldErrors::gathered(&self.session, &self.of.folds, &errors?))
     }
 
     /// The coefficients of a rival (by its position) in the place of some causes, with their standard deviations, SI.

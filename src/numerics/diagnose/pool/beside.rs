@@ -1,6 +1,6 @@
 //! New forms judged beside a set of hypotheses and the base model, without a place in the pool.
 
-use super::cached::CachedHypotheses;
+use super::hypotheses::HypothesisSet;
 use super::cholesky::PivotedCholesky;
 use super::linear::dot;
 use crate::criteria::search::{IDLE, LEVELS};
@@ -16,7 +16,7 @@ const FORMS: usize = 4;
 
 /// A set of hypotheses and the base model, beside which forms are tried.
 pub(crate) struct Beside<'p, 'a> {
-    pool: &'p CachedHypotheses<'a>,
+    pool: &'p HypothesisSet<'a>,
     /// Columns of the set that the data see, residual rows x rank.
     columns: Mat<f64>,
     /// Cholesky factor of their Gram matrix.
@@ -37,7 +37,7 @@ struct AlongTravel {
 }
 
 impl<'p, 'a> Beside<'p, 'a> {
-    pub fn of(pool: &'p CachedHypotheses<'a>, set: &[usize]) -> Self {
+    pub fn of(pool: &'p HypothesisSet<'a>, set: &[usize]) -> Self {
         let (factor, own) = (pool.factor(set), pool.columns_of(set));
         let mut columns = Mat::zeros(pool.residual_rows, factor.rank());
         for (k, column) in factor.order.iter().enumerate() {

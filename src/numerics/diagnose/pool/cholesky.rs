@@ -59,13 +59,6 @@ impl PivotedCholesky {
         Mat::from_fn(self.rank(), self.rank(), |i, j| if j <= i { self.row(i)[j] } else { 0.0 })
     }
 
-    /// The inverse of the factor, lower triangular.
-    pub fn inverse(&self) -> Mat<f64> {
-        let mut inverse = Mat::identity(self.rank(), self.rank());
-        solve_lower_triangular_in_place(self.lower().as_ref(), inverse.as_mut(), Par::Seq);
-        inverse
-    }
-
     pub fn rank(&self) -> usize {
         self.order.len()
     }

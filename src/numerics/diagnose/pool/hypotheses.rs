@@ -3,26 +3,20 @@
 //! A coefficient estimated on the projected residual is the one that a joint fit with all geometry would give, so that the part
 //! of an effect that geometry had absorbed comes back in full.
 
-use super::earlier::ListedColumns;
-use super::linear::{dot, gram, orthonormal, project, span};
+use super::cholesky::PivotedCholesky;
+use super::linear::{dot, gram, orthonormal, project};
+use super::solve::{Solution, solve};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::Hypothesis;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
-use std::ops::{Deref, Range};
 
 /// Hypotheses over one residual.
 pub(crate) struct HypothesisSet<'a> {
     pub problem: &'a WhitenedProblem<'a>,
     pub hypotheses: Vec<Hypothesis>,
-    /// How many of them are of the list; the others came while it was searched.
-    pub listed: usize,
-    /// Key of each form: only one of a key is in a set.
-    pub keys: Vec<String>,
     pub residual_rows: usize,
-    /// Residual rows that say something new: fewer where what is left lasts from row to row.
-    pub effective_rows: f64,
     /// Orthonormal basis of what the base model absorbs.
     pub base: Mat<f64>,
     /// Projected residual and its square.
@@ -38,49 +32,25 @@ pub(crate) struct HypothesisSet<'a> {
     pub gradient: Vec<f64>,
     /// Gram matrix of each hypothesis, row by row.
     pub gram: Vec<Vec<f64>>,
-    /// -2 ln of the prior of each.
-    pub prior_penalty: Vec<f64>,
-    /// Whether it is of the torque model, seen only through a compliance in the same set.
-    pub of_torque_model: Vec<bool>,
 }
 
 /// Columns that one thread projects at once.
 const CHUNK: usize = 64;
 
 impl<'a> HypothesisSet<'a> {
-    /// `residual` is that of the model without any of the hypotheses; `jacobian` that of the base model. So many rows as
-    /// `autocorrelation_time` count as one.
+    /// `residual` is that of the model without any of the hypotheses; `jacobian` that of the base model.
     pub fn new(
         problem: &'a WhitenedProblem<'a>,
         jacobian: &Mat<f64>,
         residual: &[f64],
-        autocorrelation_time: f64,
         hypotheses: Vec<Hypothesis>,
     ) -> Self {
-        let mut pool = Self::empty(problem, orthonormal(jacobian), residual, autocorrelation_time);
+        let mut pool = Self::empty(problem, orthonormal(jacobian), residual);
         pool.add(hypotheses);
-        pool.listed = pool.hypotheses.len();
         pool
     }
 
-    /// The list of an earlier round, which has the same rows, on another residual.
-    pub(super) fn again(
-        problem: &'a WhitenedProblem<'a>,
-        listed: ListedColumns,
-        residual: &[f64],
-        autocorrelation_time: f64,
-    ) -> Self {
-        let ListedColumns { hypotheses, base, columns, scale, first, gram } = listed;
-        let mut pool = Self::empty(problem, base, residual, autocorrelation_time);
-        (pool.columns, pool.scale, pool.first) = (columns, scale, first);
-        for (hypothesis, gram) in hypotheses.into_iter().zip(gram) {
-            pool.register(hypothesis, Some(gram));
-        }
-        pool.listed = pool.hypotheses.len();
-        pool
-    }
-
-    fn empty(problem: &'a WhitenedProblem<'a>, base: Mat<f64>, residual: &[f64], autocorrelation_time: f64) -> Self {
+    fn empty(problem: &'a WhitenedProblem<'a>, base: Mat<f64>, residual: &[f64]) -> Self {
         let residual_rows = residual.len();
         let mut residual = residual.to_vec();
         project(base.as_ref(), &mut residual);
@@ -88,10 +58,7 @@ impl<'a> HypothesisSet<'a> {
         Self {
             problem,
             hypotheses: Vec::new(),
-            listed: 0,
-            keys: Vec::new(),
             residual_rows,
-            effective_rows: residual_rows as f64 / autocorrelation_time,
             base,
             residual,
             square,
@@ -100,36 +67,7 @@ impl<'a> HypothesisSet<'a> {
             scale: Vec::new(),
             gradient: Vec::new(),
             gram: Vec::new(),
-            prior_penalty: Vec::new(),
-            of_torque_model: Vec::new(),
         }
-    }
-
-    /// Takes a hypothesis whose projected columns, with their raw lengths, are known; returns its position.
-    pub(super) fn add_known(&mut self, hypothesis: Hypothesis, (columns, scale): (Vec<f64>, Vec<f64>)) -> usize {
-        self.columns.extend(columns);
-        self.scale.extend(scale);
-        self.first.push(self.scale.len());
-        self.register(hypothesis, None);
-        self.hypotheses.len() - 1
-    }
-
-    /// Columns with their raw lengths.
-    pub(super) fn take_columns(&self, own: Range<usize>) -> (Vec<f64>, Vec<f64>) {
-        let rows = self.residual_rows;
-        (self.columns[own.start * rows..own.end * rows].to_vec(), self.scale[own].to_vec())
-    }
-
-    /// The list with its columns.
-    pub(super) fn into_columns(mut self) -> ListedColumns {
-        let columns = self.first[self.listed];
-        self.columns.truncate(columns * self.residual_rows);
-        self.scale.truncate(columns);
-        self.first.truncate(self.listed + 1);
-        self.hypotheses.truncate(self.listed);
-        self.gram.truncate(self.listed);
-        let Self { hypotheses, base, columns, scale, first, gram, .. } = self;
-        ListedColumns { hypotheses, base, columns, scale, first, gram }
     }
 
     /// Takes more hypotheses; returns the position of the first.
@@ -158,26 +96,17 @@ impl<'a> HypothesisSet<'a> {
             })
             .collect();
         self.scale.extend(norms.into_iter().flatten());
-        hypotheses.into_iter().for_each(|hypothesis| self.register(hypothesis, None));
+        hypotheses.into_iter().for_each(|hypothesis| self.register(hypothesis));
         begin
     }
 
     /// Takes the next hypothesis, whose columns are there.
-    fn register(&mut self, hypothesis: Hypothesis, known: Option<Vec<f64>>) {
+    fn register(&mut self, hypothesis: Hypothesis) {
         let (k, rows) = (self.hypotheses.len(), self.residual_rows);
         let own: Vec<&[f64]> = (self.first[k]..self.first[k + 1]).map(|c| &self.columns[c * rows..(c + 1) * rows]).collect();
         self.gradient.extend(own.iter().map(|column| dot(column, &self.residual)));
-        self.gram.push(known.unwrap_or_else(|| gram(&own)));
-        let places = hypothesis.form.place().count(self.problem.robot.joints()) as f64;
-        self.prior_penalty.push(2.0 * hypothesis.tried.ln() + hypothesis.prior_penalty + 2.0 * places.ln());
-        self.of_torque_model.push(hypothesis.form.is_of_torque_model());
-        self.keys.push(hypothesis.form.key());
+        self.gram.push(gram(&own));
         self.hypotheses.push(hypothesis);
-    }
-
-    /// How many parameters the base model estimates.
-    pub fn rank(&self) -> usize {
-        self.base.ncols()
     }
 
     pub(super) fn column(&self, column: usize) -> &[f64] {
@@ -200,29 +129,16 @@ impl<'a> HypothesisSet<'a> {
         products
     }
 
-    /// Products of the columns of a hypothesis with those of the pool from `begin` on, for one column of the pool after another.
-    pub fn products_with_all(&self, h: usize, begin: usize) -> Vec<f64> {
-        let own = self.columns_from(h);
-        let mut products = vec![0.0; own.ncols() * (self.scale.len() - begin)];
-        products.par_chunks_mut(CHUNK * own.ncols().max(1)).enumerate().for_each(|(chunk, products)| {
-            let count = products.len() / own.ncols();
-            let some = self.all().subcols(begin + chunk * CHUNK, count);
-            let products = MatMut::from_column_major_slice_mut(products, own.ncols(), count);
-            matmul(products, Accum::Replace, own.transpose(), some, 1.0, Par::Seq);
-        });
-        products
-    }
-
-    /// Gram matrix of all columns of a set, row by row, from the products of its pairs; the upper triangle of it is empty but for that
+    /// Gram matrix of all columns of a set, row by row; the upper triangle of it is empty but for that
     /// of single hypotheses.
-    pub fn gram_of<P: Deref<Target = Mat<f64>>>(&self, set: &[usize], products: impl Fn(usize, usize) -> P) -> Vec<f64> {
+    fn gram_of(&self, set: &[usize]) -> Vec<f64> {
         let q: usize = set.iter().map(|h| self.first[h + 1] - self.first[*h]).sum();
         let mut gram = vec![0.0; q * q];
         let mut down = 0;
         for (n, a) in set.iter().enumerate() {
             let (rows, mut across) = (self.first[a + 1] - self.first[*a], 0);
             for b in &set[..n] {
-                let products = products(*a, *b);
+                let products = self.products(*a, *b);
                 for i in 0..rows {
                     for j in 0..products.ncols() {
                         gram[(down + i) * q + across + j] = products[(i, j)];
@@ -243,9 +159,13 @@ impl<'a> HypothesisSet<'a> {
         set.iter().flat_map(|k| self.first[*k]..self.first[*k + 1]).collect()
     }
 
-    /// Orthonormal basis of the columns of a set.
-    pub fn span(&self, set: &[usize]) -> Mat<f64> {
-        let columns: Vec<&[f64]> = self.columns_of(set).into_iter().map(|column| self.column(column)).collect();
-        span(&columns, self.residual_rows)
+    /// The factor of the Gram matrix of a set's columns.
+    pub(super) fn factor(&self, set: &[usize]) -> PivotedCholesky {
+        PivotedCholesky::of(self.gram_of(set), self.columns_of(set).len())
+    }
+
+    /// Estimates a set of hypotheses together, beside the base model.
+    pub fn solve(&self, set: &[usize]) -> Solution {
+        solve(self, set, self.factor(set))
     }
 }

@@ -51,33 +51,3 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let tail: f64 = (4 * chunks..a.len()).map(|k| a[k] * b[k]).sum();
     sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
-
-/// Columns that are made orthonormal at once.
-const BLOCK: usize = 16;
-
-/// Orthonormal basis of columns of `rows` entries and about unit length; what is below [`INVISIBLE`] is left out.
-pub(super) fn span(columns: &[&[f64]], rows: usize) -> Mat<f64> {
-    let mut basis: Vec<f64> = Vec::with_capacity(columns.len() * rows);
-    for block in columns.chunks(BLOCK) {
-        let mut rest: Vec<f64> = block.iter().copied().flatten().copied().collect();
-        // Twice is enough (Giraud, Langou and Rozloznik, 2005).
-        for _ in 0..2 {
-            project(MatRef::from_column_major_slice(&basis, rows, basis.len() / rows), &mut rest);
-        }
-        let first = basis.len();
-        for column in rest.chunks_mut(rows) {
-            for _ in 0..2 {
-                for direction in basis[first..].chunks(rows) {
-                    let along = dot(column, direction);
-                    column.iter_mut().zip(direction).for_each(|(value, b)| *value -= along * b);
-                }
-            }
-            let size = dot(column, column);
-            if size > INVISIBLE {
-                let root = size.sqrt();
-                basis.extend(column.iter().map(|value| value / root));
-            }
-        }
-    }
-    MatRef::from_column_major_slice(&basis, rows, basis.len() / rows).to_owned()
-}

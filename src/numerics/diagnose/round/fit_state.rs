@@ -3,12 +3,12 @@
 use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
 use super::noise::{JointSpread, RepeatPairs, by_residual};
-use crate::criteria::noise::{ESTIMATES, GEOMETRY, REPEATS, SETTLED, SLOW};
+use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
-use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, arm_effect, names};
+use crate::diagnose::whitened::AutocorrelatedNoise;
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened};
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::Measurements;
 use std::ops::Range;
 
 /// A model with causes, fitted.
@@ -47,47 +47,6 @@ pub(crate) struct EstimatedCause {
     pub form: Form,
     pub coefficients: Vec<f64>,
     pub priors: Vec<Prior>,
-}
-
-/// The scale of a curve's coefficients in medians of their size: twice that of normal ones.
-const TYPICAL: f64 = 2.0 * 1.4826;
-
-impl EstimatedCause {
-    /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or
-    /// between sparse points: most of them are of one size (empirical Bayes), and none is larger than is plausible.
-    pub fn shrunk(form: Form, robot: &RobotModel, coefficients: Vec<f64>) -> Self {
-        let (curve, held) = (form.free_curve(), form.held());
-        if curve.is_empty() && held.is_none() {
-            return Self { form, coefficients, priors: Vec::new() };
-        }
-        let mut sizes: Vec<f64> = coefficients[curve.clone()].iter().map(|value| value.abs()).collect();
-        let middle = sizes.len() / 2;
-        let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        let share = |k: usize| if k < curve.start + *SLOW { *GEOMETRY } else { 1.0 };
-        let of_curve = |k: usize, plausible: f64| (share(k) * plausible.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
-        let sigma = |k: usize, spec: ParameterSpec| match held {
-            Some((ref numbers, sigma)) if numbers.contains(&k) => sigma,
-            _ if curve.contains(&k) => of_curve(k, spec.prior_sigma),
-            _ => spec.prior_sigma,
-        };
-        let specs = form.parameters(robot).into_iter().enumerate();
-        let priors = specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect();
-        Self { form, coefficients, priors }
-    }
-
-    /// Causes with their coefficients; what belongs to the torque model also with what the motor currents say of it.
-    pub fn all(problem: &WhitenedProblem, causes: Vec<(Form, Vec<f64>)>) -> Vec<Self> {
-        let of_torque_model: Vec<&Form> = causes.iter().map(|(form, _)| form).filter(|form| form.is_of_torque_model()).collect();
-        let mut by_currents = problem.priors_by_currents(&of_torque_model).into_iter();
-        let one = |(form, coefficients): (Form, Vec<f64>)| {
-            if !form.is_of_torque_model() {
-                return Self::shrunk(form, problem.robot, coefficients);
-            }
-            let priors = by_currents.by_ref().take(coefficients.len()).collect();
-            Self { form, coefficients, priors }
-        };
-        causes.into_iter().map(one).collect()
-    }
 }
 
 /// What fits stay the same in: the recording with its noise, and what of the base model is estimated.
@@ -189,17 +148,6 @@ impl<'a> Fitter<'a> {
         ((other - now).abs() > *SETTLED * other.max(now)).then_some(other)
     }
 
-    /// The share, in squares, of the noise that its statement and repeats show, whatever a residual was said to be.
-    pub fn least_of_the_noise(&self) -> f64 {
-        if self.repeatability.sigma <= self.repeated {
-            return 1.0;
-        }
-        let mut known = self.data.clone();
-        self.spread.put(&mut known, self.repeated);
-        let square = |data: &Measurements| self.question.fit.iter().map(|row| self.scale.noise(data, *row).powi(2)).sum::<f64>();
-        square(&known) / square(&self.data).max(f64::MIN_POSITIVE)
-    }
-
     /// Takes the noise that a residual showed.
     pub fn learn(&mut self, sigma: f64) {
         self.asked = true;
@@ -210,11 +158,6 @@ impl<'a> Fitter<'a> {
     /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.
     pub fn may_estimate_correlation(&self, settled: &FitState) -> bool {
         self.estimated < *ESTIMATES && !self.data.in_motion(&settled.screening.kept)
-    }
-
-    /// Whether neighbours in time are neighbours in pose: there noise that lasts looks like a smooth function of any variable.
-    pub fn is_on_a_path(&self, rows: &[usize]) -> bool {
-        self.data.in_motion(rows) || follow_a_path(&self.data, rows)
     }
 
     /// Whether causes that do not follow time are searched by themselves: rows follow a path, and something looks correlated.

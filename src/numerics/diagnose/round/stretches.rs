@@ -1,4 +1,4 @@
-//! Rows that say something of their own: which of them a search looks at, how many count as one, and where one pose ends.
+//! Rows that say something of their own: which of them a search looks at, and how many count as one.
 
 use crate::criteria::noise::{ALONE, SEARCHED, STRETCHES};
 use crate::diagnose::whitened::WhitenedProblem;
@@ -24,21 +24,4 @@ pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let moving = problem.width().filter(|_| problem.data.in_motion(rows));
     let time = moving.map_or(1.0, |width| autocorrelation_time(problem.of_readings(), width));
     if time < *ALONE { 1.0 } else { time.min(rows.len() as f64 / *STRETCHES as f64).max(1.0) }
-}
-
-/// Poses of rows, numbered in order: repeats share one. Of a moving arm stretches beyond which what is left is forgotten.
-pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f64) -> Vec<usize> {
-    if autocorrelation_time > 1.0 {
-        let stretch = ((2.0 * autocorrelation_time).ceil() as usize).min(rows.len() / *STRETCHES).max(1);
-        return (0..rows.len()).map(|i| i / stretch).collect();
-    }
-    let mut measured: Vec<usize> = (0..rows.len()).collect();
-    measured.sort_by_key(|i| data.rank_in_time(rows[*i]));
-    let mut out = vec![0; rows.len()];
-    for pair in measured.windows(2) {
-        let (before, row) = (rows[pair[0]], rows[pair[1]]);
-        let new = !data.same_pose(before, row) && data.rank_in_time(data.stop(row)) > data.rank_in_time(before);
-        out[pair[1]] = out[pair[0]] + usize::from(new);
-    }
-    out
 }

@@ -1,8 +1,8 @@
 //! The recording around the present model, as a round looks at it.
 
 use super::fit_state::{FitState, Fitter};
-use super::stretches::{bounded_autocorrelation_time, poses, thinned};
-use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
+use super::stretches::{bounded_autocorrelation_time, thinned};
+use crate::diagnose::pool::HypothesisSet;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{Hypothesis, Survey};
 use crate::estimate::Model;
@@ -10,8 +10,6 @@ use crate::estimate::Model;
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
     pub problem: WhitenedProblem<'a>,
-    /// Pose of each row.
-    pub pose: Vec<usize>,
     autocorrelation_time: f64,
     torque: Vec<f64>,
     /// How far each joint yields, rad/Nm.
@@ -30,8 +28,7 @@ impl<'a> RoundView<'a> {
         if let Some(noise) = fitter.correlated {
             problem = problem.with_autocorrelation(noise);
         }
-        let pose = poses(data, &problem.rows, autocorrelation_time);
-        Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }
+        Self { autocorrelation_time, torque: problem.torques(), compliance, problem }
     }
 
     /// How many rows of what is left count as one.
@@ -45,7 +42,7 @@ impl<'a> RoundView<'a> {
     }
 
     /// The causes of a model over what is left without them.
-    pub fn causes(&self, now: &FitState, fitter: &Fitter) -> CachedHypotheses<'_> {
+    pub fn causes(&self, now: &FitState, fitter: &Fitter) -> HypothesisSet<'_> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();
         for cause in &now.causes {
@@ -56,7 +53,7 @@ impl<'a> RoundView<'a> {
         }
         let jacobian = problem.jacobian(fitter.free());
         let hypotheses = now.causes.iter().map(|cause| Hypothesis::new(cause.form.clone(), 1)).collect();
-        HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses).into()
+        HypothesisSet::new(problem, &jacobian, &residual, hypotheses)
     }
 }
 

@@ -35,8 +35,6 @@ pub(crate) struct Answer {
     /// Probability that no further cell is there, at the start and at the end.
     pub nothing_first: f64,
     pub nothing_last: f64,
-    /// Standard deviation of the noise over what is stated.
-    pub kappa: f64,
     /// What the best further cell would be.
     pub next: Option<String>,
     pub located_first: Located,
@@ -84,7 +82,6 @@ impl Table<'_, '_> {
             found,
             nothing_first: first.1,
             nothing_last: nothing(&scan),
-            kappa: state.kappa,
             next,
             located_first: first.0,
             located_last: self.locate(&state),

@@ -185,20 +185,6 @@ impl<'a> Frame<'a> {
         Some(out)
     }
 
-    /// Rms motion (m or rad) of some columns that are not projected.
-    pub fn size(&self, forms: &[Form], coefficients: &[f64]) -> f64 {
-        let (rows, problem) = (self.residual.len(), &self.view.problem);
-        let mut sum = vec![0.0; rows];
-        let mut coefficients = coefficients.iter();
-        for form in forms {
-            let columns = self.of_term(form).unwrap_or_else(|| problem.motions_by(form));
-            for (column, coefficient) in columns.chunks(rows).zip(&mut coefficients) {
-                sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
-            }
-        }
-        self.mean_square(&sum).sqrt()
-    }
-
     fn mean_square(&self, column: &[f64]) -> f64 {
         let of_row = |(i, variance): (usize, &f64)| {
             let lines = self.view.problem.readings_of(i);
@@ -273,7 +259,7 @@ fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
     let covariance = (sum + Matrix3::identity() * (EVEN * even)) / (count + EVEN);
     let parts = covariance.symmetric_eigen();
     let (least, most) = (parts.eigenvalues.min(), parts.eigenvalues.max());
-    if !(least > 0.0) || most / least < *UNEVEN {
+    if least <= 0.0 || most / least < *UNEVEN {
         return None;
     }
     let roots = Matrix3::from_diagonal(&parts.eigenvalues.map(|variance| (even / variance).sqrt()));

@@ -101,7 +101,8 @@ impl Rounds {
         let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
         let is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
         let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
-        let causes = estimated(&table, &components);
+        let mut causes = estimated(&table, &components);
+        by_currents(&mut causes, view);
         let cells = table.cells.len();
         self.components = keys.into_iter().zip(components).collect();
         self.shown = shown;
@@ -134,6 +135,19 @@ fn estimated(table: &Table, components: &[Component]) -> Vec<EstimatedCause> {
         }
     }
     out
+}
+
+/// What the motor currents say of the numbers of the torque model, as their priors.
+fn by_currents(causes: &mut [EstimatedCause], view: &RoundView) {
+    let of_torque_model: Vec<Form> =
+        causes.iter().map(|cause| cause.form.clone()).filter(|form| form.is_of_torque_model()).collect();
+    let mut priors = view.problem.priors_by_currents(&of_torque_model.iter().collect::<Vec<_>>()).into_iter();
+    for cause in causes.iter_mut().filter(|cause| cause.form.is_of_torque_model()) {
+        let own: Vec<Prior> = priors.by_ref().take(cause.coefficients.len()).collect();
+        if own.len() == cause.coefficients.len() {
+            cause.priors = own;
+        }
+    }
 }
 
 /// A form with a curve of no more waves than are `seen`, and which of its columns stay.

@@ -154,15 +154,11 @@ impl PartProducts {
             *cache = PartCache::default();
         }
         for (i, own) in components.iter().enumerate() {
-            if !cache.along.contains_key(&own.id) {
-                cache.along.insert(own.id, Arc::new(frame.along(&own.part)));
-            }
+            cache.along.entry(own.id).or_insert_with(|| Arc::new(frame.along(&own.part)));
             for other in &components[..=i] {
                 let key = (own.id.max(other.id), own.id.min(other.id));
-                if !cache.pairs.contains_key(&key) {
-                    let [later, earlier] = if own.id >= other.id { [own, other] } else { [other, own] };
-                    cache.pairs.insert(key, Arc::new(product(view(&later.part), view(&earlier.part))));
-                }
+                let [later, earlier] = if own.id >= other.id { [own, other] } else { [other, own] };
+                cache.pairs.entry(key).or_insert_with(|| Arc::new(product(view(&later.part), view(&earlier.part))));
             }
         }
     }
@@ -379,8 +375,7 @@ impl State {
 /// L^-1 times columns, one after another.
 fn solve(lower: &Mat<f64>, columns: &mut [f64]) {
     let rows = lower.nrows();
-    if rows > 0 {
-        let count = columns.len() / rows;
+    if let Some(count) = columns.len().checked_div(rows) {
         let columns = MatMut::from_column_major_slice_mut(columns, rows, count);
         solve_lower_triangular_in_place(lower.as_ref(), columns, Par::Seq);
     }
