@@ -48,6 +48,8 @@ pub struct StarterFiles {
     pub accounts: Vec<(PathBuf, String)>,
     /// What no recording has.
     pub missing: Vec<&'static str>,
+    /// What a person should know of the robot, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl StarterFiles {
@@ -82,7 +84,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
     let urdf = request.urdf.map(|path| outline(path, request.tip)).transpose()?;
     let robot = match &urdf {
-        Some(UrdfOutline { base, sliding }) => {
+        Some(UrdfOutline { base, sliding, .. }) => {
             if let Some(n) = joints.filter(|n| *n != sliding.len()) {
                 let message = format!(
                     "the chain from `{base}` to `{}` has {}, the recording {n}; name the last link that moves, or one fixed to it",
@@ -104,7 +106,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     };
     let mut joined = together::join(&mut found);
     joined.lines.extend(pipeline::later(request.folder, &found, &more));
-    let sliding = urdf.map(|outline| outline.sliding).unwrap_or_default();
+    let (sliding, notes) = urdf.map(|outline| (outline.sliding, outline.notes)).unwrap_or_default();
     let pipeline = pipeline::text(request, &found, (&joined, &sliding))?;
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
     Ok(StarterFiles {
@@ -116,5 +118,6 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         } else {
             unknown.filter(|(_, missing)| *missing).map(|(what, _)| what).collect()
         },
+        notes,
     })
 }

@@ -103,6 +103,8 @@ pub(super) struct Scan {
     pub beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
     pub largest: f64,
+    /// Least and largest position of each joint, rad or m.
+    pub ranges: Vec<[f64; 2]>,
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
     /// Hash of what all its usable rows say, of a file with what was measured.
@@ -130,10 +132,15 @@ impl Scan {
             turns: FileOddities::default(),
             beyond: FileOddities::default(),
             largest: 0.0,
+            ranges: Vec::new(),
             track: None,
             measured: None,
             first_ids: Vec::new(),
         }
+    }
+    /// How far a joint turns over the rows at most, rad or m.
+    pub(super) fn largest_turn(&self) -> f64 {
+        self.ranges.iter().map(|[least, most]| most - least).fold(0.0, f64::max)
     }
     pub(super) fn refused(&self) -> u64 {
         self.tally.values().map(|count| count.rows).sum()
@@ -265,6 +272,10 @@ impl Scan {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
             self.largest = self.largest.max(value.abs());
+        }
+        self.ranges.resize(q.len(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for (value, [least, most]) in q.iter().zip(&mut self.ranges) {
+            (*least, *most) = (least.min(*value), most.max(*value));
         }
         if let Some(joint) = row.beyond {
             self.beyond.count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));

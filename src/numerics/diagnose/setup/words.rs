@@ -1,5 +1,6 @@
 //! Set-up errors in the words of an engineer, each with what mends it.
 
+use super::counting::{CountedJoint, Counting};
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
@@ -76,6 +77,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
                 format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
+        WrongSetup::Counting(counting) => return of_counting(counting, joints),
         WrongSetup::Coupled { moved, by, sign } => {
             let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
             let (moved, by) = (moved + 1, by + 1);
@@ -126,6 +128,40 @@ fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
             signs.join(", ")
         ),
     )
+}
+
+/// Signs, zeros and couplings of all joints.
+fn of_counting(counting: Counting, joints: usize) -> SetupWords {
+    let all: Vec<(usize, CountedJoint)> = counting.joints().iter().copied().enumerate().take(joints).collect();
+    let reversed: Vec<usize> = all.iter().filter(|(_, own)| own.reversed).map(|(joint, _)| *joint).collect();
+    let list = |of: &dyn Fn(&CountedJoint) -> i32| all.iter().map(|(_, own)| of(own).to_string()).collect::<Vec<_>>().join(", ");
+    let (mut what, mut mend) = (Vec::new(), Vec::new());
+    if !reversed.is_empty() {
+        what.push(of_signs(&reversed, joints).0);
+        mend.push(format!("sign: [{}]", list(&|own| if own.reversed { -1 } else { 1 })));
+    }
+    let zeros: Vec<String> = all
+        .iter()
+        .filter(|(_, own)| own.quarters != 0)
+        .map(|(joint, own)| format!("{} deg at the zero of joint {}", 90 * own.quarters, joint + 1))
+        .collect();
+    if !zeros.is_empty() {
+        what.push(format!("the recording reads {}", zeros.join(" and ")));
+        mend.push(format!("zero: [{}]", list(&|own| 90 * own.quarters)));
+    }
+    let coupled: Vec<(usize, i32)> =
+        all.iter().filter(|(_, own)| own.coupled != 0).map(|(joint, own)| (joint + 1, own.coupled)).collect();
+    if !coupled.is_empty() {
+        let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
+        what.extend(coupled.iter().map(|(joint, ratio)| {
+            format!("joint {joint} is reported {} the angle of joint {}", how(*ratio), joint - 1)
+        }));
+        let each: Vec<String> =
+            coupled.iter().map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1)).collect();
+        mend.push(format!("coupled: [{}]", each.join(", ")));
+    }
+    let degrees = if zeros.is_empty() { "" } else { ", zeros in deg" };
+    SetupWords::of(what.join(", and "), format!("in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}", mend.join(", ")))
 }
 
 fn unit_name(unit: &str) -> &'static str {
