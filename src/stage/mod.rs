@@ -39,6 +39,7 @@ mod stored;
 mod text_file;
 mod torque_signal;
 mod transfer;
+mod unmoved;
 mod validate;
 mod weightless;
 

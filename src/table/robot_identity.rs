@@ -72,6 +72,11 @@ macro_rules! of_one_robot {
                 self
             }
 
+            /// Whether the table says of which robot it is.
+            pub fn says_its_robot(&self) -> bool {
+                self.0.iter().all(|row| row.robot.is_some() && row.kinematics.is_some())
+            }
+
             /// Fails where the table says that it is the model of another robot.
             pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
                 let mut stated = self.0.iter().filter_map(|row| row.robot.clone().zip(row.kinematics.clone()));

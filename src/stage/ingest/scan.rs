@@ -5,6 +5,7 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
+use super::external;
 use super::fingerprint::{Fingerprints, behind};
 use super::ids::{FileIds, narrow};
 use super::layout::{FileLayout, Join};
@@ -168,6 +169,7 @@ pub(super) fn open(settings: &Ingest, layout: &FileLayout, arm: &Arc<RobotJoints
     let source = context.services.open(&layout.file)?;
     let size = source.size;
     let reading = OpenedFile::open(source, layout, arm, settings.limits)?;
+    external::must_stand(&reading, layout, arm, context)?;
     for remark in reading.remarks() {
         context.services.note(format!("{}: {remark}", reading.label));
     }
