@@ -101,7 +101,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 31;
+    const IMPLEMENTATION: u32 = 32;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 

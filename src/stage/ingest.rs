@@ -135,7 +135,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 

@@ -37,8 +37,7 @@ impl RobotIdentity {
     }
 
     /// Fails where a table of the kind `kind` with this identity is used for another robot.
-    fn must_be(&self, robot: &RobotDescription, kind: &str) -> Result<()> {
-        let other = Self::of(robot);
+    fn must_be(&self, other: &Self, kind: &str) -> Result<()> {
         let message = match (self.name == other.name, self.kinematics == other.kinematics) {
             (true, true) => return Ok(()),
             (false, true) => format!(
@@ -79,8 +78,9 @@ macro_rules! of_one_robot {
 
             /// Fails where the table says that it is the model of another robot.
             pub fn must_be_of(&self, robot: &RobotDescription) -> Result<()> {
+                let other = RobotIdentity::of(robot);
                 let mut stated = self.0.iter().filter_map(|row| row.robot.clone().zip(row.kinematics.clone()));
-                stated.try_for_each(|(name, kinematics)| RobotIdentity { name, kinematics }.must_be(robot, $kind))
+                stated.try_for_each(|(name, kinematics)| RobotIdentity { name, kinematics }.must_be(&other, $kind))
             }
         }
     };

@@ -80,7 +80,19 @@ impl TorqueParameters {
                 let (rms_nm, form) = (Some(term.rms), Some(form.clone()));
                 let (robot, kinematics) = (None, None);
                 let value = *value;
-                rows.push(TorqueParameterRow { name, effect, place, quantity, value, unit, sigma, rms_nm, form, robot, kinematics });
+                rows.push(TorqueParameterRow {
+                    name,
+                    effect,
+                    place,
+                    quantity,
+                    value,
+                    unit,
+                    sigma,
+                    rms_nm,
+                    form,
+                    robot,
+                    kinematics,
+                });
             }
         }
         for term in &model.terms {
@@ -88,7 +100,19 @@ impl TorqueParameters {
                 let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
                 let (effect, place) = (term.effect.clone(), term.place.to_string());
                 let (rms_nm, form, robot, kinematics) = (None, None, None, None);
-                rows.push(TorqueParameterRow { name, effect, place, quantity, value, unit, sigma, rms_nm, form, robot, kinematics });
+                rows.push(TorqueParameterRow {
+                    name,
+                    effect,
+                    place,
+                    quantity,
+                    value,
+                    unit,
+                    sigma,
+                    rms_nm,
+                    form,
+                    robot,
+                    kinematics,
+                });
             }
         }
         rows.extend(seen(model));

@@ -49,8 +49,7 @@ fn told(folder: &Path, uses: &str, joints: impl Fn(usize) -> [f64; 6], creep: im
 fn one_pose_measured_fifty_times_is_no_geometry_and_its_creep_is_told() {
     for uses in ["identify", "diagnose"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let (code, said) =
-            told(folder.path(), uses, |_| [10.0, 20.0, -30.0, 40.0, 50.0, 60.0], |row| 0.2 * row as f64 / 49.0);
+        let (code, said) = told(folder.path(), uses, |_| [10.0, 20.0, -30.0, 40.0, 50.0, 60.0], |row| 0.2 * row as f64 / 49.0);
         assert_eq!(code, Some(10), "{said}");
         assert!(said.contains("all 40 rows to fit are of one pose: geometry needs poses in which every joint moves"), "{said}");
         let drift = said.split("the point drifts by ").nth(1).and_then(|text| text.split(" mm").next());

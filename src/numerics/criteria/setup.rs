@@ -25,6 +25,8 @@ criteria! {
     SECOND: usize = 6, "errors", "judgement: bounds time", "";
     /// Points by which countings of all joints are compared before they are placed.
     SCREENED: usize = 60, "rows", "judgement: bounds time", "";
+    /// A zero that is this near to quarter turns is counted from there, whatever it is off by beyond that.
+    QUARTERLY: f64 = 5.0, "deg", "physics: zeros are mastered to degrees at worst", "";
     /// Countings that are placed.
     COUNTINGS: usize = 16, "countings", "count: mirror images and turned wrists of one counting, twice", "";
     /// What no arm's length is off by when it is made, as a share of itself.

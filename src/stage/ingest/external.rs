@@ -77,9 +77,15 @@ mod tests {
 
     #[test]
     fn names_of_axes_beside_the_arm_are_known_with_their_units() {
-        for (name, unit) in
-            [("eax_a", "deg"), ("E1", "deg"), ("e2_mm", "mm"), ("ext_axis_1_m", "m"), ("Track", "deg"), ("rail_mm", "mm"), ("eax1", "deg")]
-        {
+        for (name, unit) in [
+            ("eax_a", "deg"),
+            ("E1", "deg"),
+            ("e2_mm", "mm"),
+            ("ext_axis_1_m", "m"),
+            ("Track", "deg"),
+            ("rail_mm", "mm"),
+            ("eax1", "deg"),
+        ] {
             assert_eq!(external(name), Some(unit), "{name}");
         }
         for name in ["e", "error_1", "q7", "x_mm", "track_id", "e12", "exact", "mm", ""] {

@@ -403,14 +403,14 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             0.0,
             &["sign: [-1, 1, 1, -1, 1, -1]", "zero: [0, -90, 90, 0, 0, 0]"],
         ),
-        ("sign of 3, joint 3 plus joint 2", [1.0, 1.0, -1.0, 1.0, 1.0, 1.0], [0.0; 6], 1.0, &["coupled: [{joint: 3, by: 2, ratio: "]),
         (
-            "zeros of 2, 3 and 5",
-            [1.0; 6],
-            [0.0, 1.0, 2.0, 0.0, -1.0, 0.0],
-            0.0,
-            &["zero: [0, 90, 180, 0, -90, 0]"],
+            "sign of 3, joint 3 plus joint 2",
+            [1.0, 1.0, -1.0, 1.0, 1.0, 1.0],
+            [0.0; 6],
+            1.0,
+            &["coupled: [{joint: 3, by: 2, ratio: "],
         ),
+        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &["zero: [0, 90, 180, 0, -90, 0]"]),
     ];
     for (robot, seed) in arms().iter().zip([61, 62, 63]) {
         let sound = recorded(robot, seed, json!([]));

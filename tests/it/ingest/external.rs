@@ -42,7 +42,8 @@ fn joints_beyond_the_limits_are_a_hint_of_their_counting() {
     take(&desk, YAML, robot("rr", 0.5)).expect("a recording");
     let warnings = desk.warnings.lock().expect("warnings").join("\n");
     assert!(
-        warnings.contains("12 rows with a joint beyond the robot's limits, used all the same") && warnings.contains("`sign`, `zero`, `coupled` of `q`"),
+        warnings.contains("12 rows with a joint beyond the robot's limits, used all the same")
+            && warnings.contains("`sign`, `zero`, `coupled` of `q`"),
         "{warnings}"
     );
 }

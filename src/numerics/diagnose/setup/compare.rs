@@ -144,9 +144,8 @@ fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let best = explaining.iter().find(|tried| tried.share <= *SAME * least)?;
     // Countings that leave the same are the same by kinematics.
     let is_same = |tried: &Try| matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least;
-    let is_rival = |tried: &&&Try| {
-        tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1 && !is_same(tried)
-    };
+    let is_rival =
+        |tried: &&&Try| tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1 && !is_same(tried);
     let alike = explaining.iter().filter(is_rival).map(|tried| tried.wrong[0]).collect();
     Some(ExplainedSetup { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
 }

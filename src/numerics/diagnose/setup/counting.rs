@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 /// Arms of more joints are not searched.
-const MOST_JOINTS: usize = 8;
+pub(super) const MOST: usize = 8;
 /// Share of a normal equation's diagonal that keeps unseen numbers where they are.
 const RIDGE: f64 = 1e-9;
 /// A choice that leaves less by this share is better.
-const BETTER: f64 = 1e-6;
+const SETTLED: f64 = 1e-6;
 
 /// A joint's number: sign (true + quarter turns), and so often the joint before it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -32,7 +32,7 @@ pub(super) struct CountedJoint {
 
 /// Of each joint of an arm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Counting([CountedJoint; MOST_JOINTS]);
+pub(super) struct Counting([CountedJoint; MOST]);
 
 /// A number that is searched, of a joint.
 #[derive(Clone, Copy)]
@@ -46,9 +46,8 @@ impl Searched {
     fn all(robot: &RobotModel) -> Vec<Self> {
         let n = robot.joints();
         let zeros = (1..n.saturating_sub(1)).filter(|joint| robot.is_revolute(*joint)).map(Self::Zero);
-        let coupled = |joint: &usize| {
-            robot.is_revolute(*joint) && robot.is_revolute(joint - 1) && robot.is_parallel(joint - 1, *joint)
-        };
+        let coupled =
+            |joint: &usize| robot.is_revolute(*joint) && robot.is_revolute(joint - 1) && robot.is_parallel(joint - 1, *joint);
         zeros.chain((1..n).filter(coupled).map(Self::Coupling)).collect()
     }
 
@@ -73,6 +72,13 @@ impl Counting {
         &self.0
     }
 
+    /// One joint alone, that shows so many quarter turns at the robot file's zero.
+    pub fn of_a_zero(joint: usize, quarters: i32) -> Self {
+        let mut out = Self::default();
+        out.0.iter_mut().skip(joint).take(1).for_each(|own| own.quarters = quarters);
+        out
+    }
+
     /// The controller's numbers -> joint positions of the robot file, in the order of `ingest`: zeros, signs, couplings.
     pub fn to_robot(self, q: &mut [f64]) {
         for (q, joint) in q.iter_mut().zip(&self.0) {
@@ -81,7 +87,7 @@ impl Counting {
                 *q = -*q;
             }
         }
-        for joint in 1..q.len().min(MOST_JOINTS) {
+        for joint in 1..q.len().min(MOST) {
             q[joint] -= f64::from(self.0[joint].coupled) * q[joint - 1];
         }
     }
@@ -96,7 +102,7 @@ impl Counting {
     pub fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
-        if robot.joints() > MOST_JOINTS {
+        if robot.joints() > MOST {
             return Vec::new();
         }
         let some: Vec<usize> = (0..pairs.rows()).step_by(pairs.rows().div_ceil(*SCREENED).max(1)).collect();
@@ -151,14 +157,14 @@ impl AffineImage<'_, '_> {
                         for second in values {
                             let tried = if at_once > 1 { other.set(first, *second) } else { first };
                             let left = if tried == now.1 { now.0 } else { self.left(tried) };
-                            if left < (1.0 - BETTER) * now.0 {
+                            if left < (1.0 - SETTLED) * now.0 {
                                 now = (left, tried);
                             }
                         }
                     }
                 }
             }
-            if now.0 >= (1.0 - BETTER) * before {
+            if now.0 >= (1.0 - SETTLED) * before {
                 return now;
             }
         }

@@ -1,10 +1,10 @@
 //! Set-up errors in the words of an engineer, each with what mends it.
 
-use super::counting::{CountedJoint, Counting};
+use super::counting::{CountedJoint, Counting, MOST};
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
-use crate::criteria::setup::{ARMS, SMALL};
+use crate::criteria::setup::{ARMS, QUARTERLY, SMALL};
 use crate::effect::figure;
 use crate::error::counted;
 use crate::robot::{RobotModel, numbered};
@@ -93,7 +93,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             "in `ingest`: exchange the columns of `x` and `y`; since the base is fitted, this corrects both cases".into(),
         ),
         WrongSetup::Order(order) => return of_order(order),
-        WrongSetup::Number(number) => return of_number(number, values),
+        WrongSetup::Number(number) => return of_number(number, values, joints),
     };
     SetupWords::of(what, mend)
 }
@@ -140,13 +140,12 @@ fn of_counting(counting: Counting, joints: usize) -> SetupWords {
         what.push(of_signs(&reversed, joints).0);
         mend.push(format!("sign: [{}]", list(&|own| if own.reversed { -1 } else { 1 })));
     }
-    let zeros: Vec<String> = all
-        .iter()
-        .filter(|(_, own)| own.quarters != 0)
-        .map(|(joint, own)| format!("{} deg at the zero of joint {}", 90 * own.quarters, joint + 1))
-        .collect();
-    if !zeros.is_empty() {
-        what.push(format!("the recording reads {}", zeros.join(" and ")));
+    let turned = all.iter().filter(|(_, own)| own.quarters != 0);
+    let zeros =
+        turned.map(|(joint, own)| format!("the recording reads {} deg at the zero of joint {}", 90 * own.quarters, joint + 1));
+    what.extend(zeros);
+    let in_degrees = what.len() > usize::from(!reversed.is_empty());
+    if in_degrees {
         mend.push(format!("zero: [{}]", list(&|own| 90 * own.quarters)));
     }
     let coupled: Vec<(usize, i32)> =
@@ -154,13 +153,14 @@ fn of_counting(counting: Counting, joints: usize) -> SetupWords {
     if !coupled.is_empty() {
         let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
         what.extend(coupled.iter().map(|(joint, ratio)| {
-            format!("joint {joint} is reported {} the angle of joint {}", how(*ratio), joint - 1)
+            let (how, by) = (how(*ratio), joint - 1);
+            format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it")
         }));
         let each: Vec<String> =
             coupled.iter().map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1)).collect();
         mend.push(format!("coupled: [{}]", each.join(", ")));
     }
-    let degrees = if zeros.is_empty() { "" } else { ", zeros in deg" };
+    let degrees = if in_degrees { ", in deg" } else { "" };
     SetupWords::of(what.join(", and "), format!("in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}", mend.join(", ")))
 }
 
@@ -220,7 +220,7 @@ fn of_order(order: RowOrder) -> SetupWords {
     SetupWords::of(what, mend.into())
 }
 
-fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
+fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
     let (what, mend) = match number {
         FreeNumber::Length(joint) => (
             format!(
@@ -241,6 +241,13 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
         ),
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
+            let quarters = (-degrees / 90.0).round() as i32;
+            let rest = -degrees - 90.0 * f64::from(quarters);
+            if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
+                let SetupWords { what, mend, .. } = of_counting(Counting::of_a_zero(joint, quarters), joints);
+                let what = format!("{what}, which is {} deg off beyond that", figure(rest, 2));
+                return SetupWords::of(what, mend);
+            }
             (
                 format!("the zero of joint {} is off by {} deg, more than manufacture allows", joint + 1, figure(degrees, 2)),
                 format!("master joint {} again, or correct its zero in the robot file", joint + 1),

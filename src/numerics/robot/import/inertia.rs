@@ -33,11 +33,15 @@ pub fn impossible_inertia(moments: &InertiaMoments) -> Option<String> {
     let [least, middle, most] = principal;
     if least < NONE * most {
         let least = if least < -NONE * most.abs() { "negative" } else { "zero" };
-        return Some(format!("no body has a principal moment of inertia that is {least}; expected [xx, xy, xz, yy, yz, zz] about the centre"));
+        return Some(format!(
+            "no body has a principal moment of inertia that is {least}; expected [xx, xy, xz, yy, yz, zz] about the centre"
+        ));
     }
     (most > (1.0 + ROUNDING) * (least + middle)).then(|| {
         let times = most / (least + middle);
-        format!("no body has a principal moment of inertia of {times:.3} times the sum of the other two; expected at most that sum")
+        format!(
+            "no body has a principal moment of inertia of {times:.3} times the sum of the other two; expected at most that sum"
+        )
     })
 }
 
