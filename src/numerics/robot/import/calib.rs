@@ -158,10 +158,14 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
 /// parallel, frames of the Denavit-Hartenberg convention stand on a common normal that is anywhere. The arm moves as before.
 fn slide(joints: &mut [JointDescription], tool: &Vector3<f64>) {
     let mut before = Vector3::zeros();
-    for joint in joints.iter_mut().filter(|joint| joint.kind == JointKind::Revolute) {
+    for joint in joints {
         let (axis, point) = (Vector3::from(joint.axis), Vector3::from(joint.point));
         if point.norm().min((point - tool).norm()) > FAR {
-            joint.point = (point - axis * axis.dot(&(point - before))).into();
+            joint.point = match joint.kind {
+                JointKind::Revolute => (point - axis * axis.dot(&(point - before))).into(),
+                // Wherever it stands it slides alike.
+                JointKind::Prismatic => before.into(),
+            };
         }
         before = joint.point.into();
     }
