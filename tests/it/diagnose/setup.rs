@@ -383,7 +383,8 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
     said(|row| row % 2 == 1, "1, 3, 5, 7, ... (36 rows)", "2, 4, 6, 8, ... (36 rows)");
 }
 
-/// A maker's counting: signs, what is shown at the robot file's zeros in quarters of a turn, and whether joint 3 holds joint 2's angle.
+/// A maker's counting: signs, what is shown at the robot file's zeros in quarters of a turn, and whether joint 3 holds joint 2's angle; what is
+/// said of it where no other counting is the same by kinematics.
 type MakersCounting = (&'static str, [f64; 6], [f64; 6], f64, &'static [&'static str]);
 
 #[test]
@@ -396,21 +397,9 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
             0.0,
             &["sign: [1, -1, -1, 1, -1, 1]", "zero: [0, 90, 0, 0, 0, 0]"],
         ),
-        (
-            "signs of 1, 4 and 6, zeros of 2 and 3",
-            [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
-            [0.0, -1.0, 1.0, 0.0, 0.0, 0.0],
-            0.0,
-            &["sign: [-1, 1, 1, -1, 1, -1]", "zero: [0, -90, 90, 0, 0, 0]"],
-        ),
-        (
-            "sign of 3, joint 3 plus joint 2",
-            [1.0, 1.0, -1.0, 1.0, 1.0, 1.0],
-            [0.0; 6],
-            1.0,
-            &["coupled: [{joint: 3, by: 2, ratio: "],
-        ),
-        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &["zero: ["]),
+        ("signs of 1, 4 and 6, zeros of 2 and 3", [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0], [0.0, -1.0, 1.0, 0.0, 0.0, 0.0], 0.0, &[]),
+        ("sign of 3, joint 3 plus joint 2", [1.0, 1.0, -1.0, 1.0, 1.0, 1.0], [0.0; 6], 1.0, &[]),
+        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &[]),
     ];
     for (robot, seed) in arms().iter().zip([61, 62, 63]) {
         let sound = recorded(robot, seed, json!([]));

@@ -1,12 +1,12 @@
 //! How a controller may count an arm's joints otherwise than the robot file: signs, zeros by quarter turns and couplings of parallel neighbours,
 //! searched together, since each of them hides behind the others.
 //!
-//! From every choice of signs, zeros and couplings descend one by one, then two by two. What a counting leaves is judged without fitting a base:
+//! From every choice of signs, and of the two zeros nearest to the base, zeros and couplings descend one by one, then two by two. What a counting leaves is judged without fitting a base:
 //! where joints are counted rightly the point in the robot's frame, R s + t by the bodies' poses and the unknown seat s, is an affine image
 //! of the measured one, which is linear in all unknowns. Rigid placements judge the best of them.
 
 use super::pairs::{PointPairs, bodies, median};
-use crate::criteria::setup::{COUNTINGS, SAME, SCREENED, TRIM};
+use crate::criteria::setup::{CLOUD, COUNTINGS, SAME, SCREENED, TRIM};
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use nalgebra::{DMatrix, DVector};
@@ -118,7 +118,17 @@ impl Counting {
             }
             counting
         };
-        let starts: Vec<Self> = (0..1usize << turning.len()).map(signs).collect();
+        // The zeros with the longest levers are tried all: no descent leads from one of them to another.
+        let (levers, none) = (searched.iter().filter(|one| matches!(one, Searched::Zero(_))).take(2), [0]);
+        let levers: Vec<&Searched> = levers.collect();
+        let values = |lever: usize| levers.get(lever).map_or(&none[..], |one| one.values());
+        let turned = |start: Self| {
+            let set =
+                |counting: Self, lever: usize, value: i32| levers.get(lever).map_or(counting, |one| one.set(counting, value));
+            let both = values(0).iter().flat_map(|first| values(1).iter().map(move |second| (*first, *second)));
+            both.map(|(first, second)| set(set(start, 0, first), 1, second)).collect::<Vec<_>>()
+        };
+        let starts: Vec<Self> = (0..1usize << turning.len()).map(signs).flat_map(turned).collect();
         let alone = starts.into_par_iter().map(|start| affine.descended(start, &searched, 1));
         let alone = best(alone.collect(), 2 * *COUNTINGS);
         let together = alone.into_par_iter().map(|start| affine.descended(start, &searched, 2));
@@ -210,6 +220,10 @@ impl AffineImage<'_, '_> {
         let all: Vec<usize> = (0..poses.len()).collect();
         let Some((off, spread)) = self.off(&poses, &all) else { return f64::INFINITY };
         let middle = median(&off);
+        // Where most points are far from each other's images none is an exception.
+        if middle > *CLOUD * spread {
+            return middle / spread;
+        }
         let near: Vec<usize> = all.iter().copied().filter(|row| off[*row] <= *TRIM * middle).collect();
         if near.len() == all.len() {
             return middle / spread;
