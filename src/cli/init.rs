@@ -81,6 +81,9 @@ fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     for (path, text) in files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))) {
         std::fs::write(path, text).map_err(refused(path))?;
     }
+    for note in &start.notes {
+        let _ = writeln!(std::io::stderr(), "warning: {note}");
+    }
     emit(&closing(arguments, &start, &files))?;
     Ok(start)
 }

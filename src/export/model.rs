@@ -61,6 +61,7 @@ impl Export {
                 self.poses
             ),
         ];
+        lines.extend(self.measured_apart());
         if self.identified.convention.is_none() {
             lines.extend(self.identified.counting());
         }
@@ -80,6 +81,22 @@ impl Export {
             lines.push("not carried: the learned correction".into());
         }
         lines
+    }
+
+    /// What the tool has of the targets that were measured, where they are not its point alone.
+    fn measured_apart(&self) -> Option<String> {
+        let robot = &self.identified.model.robot;
+        let targets = &robot.setup().targets;
+        if let Some(tool) = robot.setup().target("") {
+            let angle = (robot.home().inverse() * targets[tool].mounting).rotation_vector().norm().to_degrees();
+            return Some(format!(
+                "the tool is the identified point, turned as in the robot file: the frame that was measured, turned by {angle:.4} deg against it, \
+                 is the instrument's"
+            ));
+        }
+        let names: Vec<&str> = targets.iter().map(|target| target.name.as_str()).collect();
+        let told = || format!("not carried: where targets sit ({}); the tool is that of the robot file", names.join(", "));
+        (!names.is_empty()).then(told)
     }
 
     /// What was refused and is written all the same.

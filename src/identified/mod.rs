@@ -189,6 +189,12 @@ impl IdentifiedModel {
             Some(_) => Parameters::default(),
             None => files.vouched(&files.parameters, from_file::<Parameters>(&files.parameters)?, &mut warnings)?,
         };
+        if torques.is_none() && !parameters.says_its_robot() {
+            warnings.push(format!(
+                "{} does not say which robot it is the model of: an earlier calib wrote it",
+                files.parameters.display()
+            ));
+        }
         let robot = if ending(&files.robot) == "parquet" {
             let loose = from_file::<Robot>(&files.robot)?;
             files.vouched(&files.robot, loose, &mut warnings)?.to_description()?

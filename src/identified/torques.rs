@@ -36,6 +36,7 @@ const OF_THE_RECORDING: [&str; 2] = ["current_latency", "contact"];
 impl IdentifiedTorques {
     /// The model in a table, for a robot. Fails where the table is no model of torques or the arm has joints that slide.
     pub(super) fn of(robot: &RobotDescription, parameters: TorqueParameters, origin: String) -> Result<Self> {
+        parameters.must_be_of(robot)?;
         let (arm, _) = dynamic_arm(robot)?;
         let model = parameters.to_model()?;
         let mut warnings = Vec::new();

@@ -17,6 +17,8 @@ pub(super) struct StartingArm {
     pub sliding: Vec<bool>,
     /// How its controller counts joints, as settings of `q`.
     pub counting: Option<String>,
+    /// What a person should know of the robot, a sentence each.
+    pub notes: Vec<String>,
     /// Where another number of joints is said, and how.
     other: (&'static str, String),
 }
@@ -30,13 +32,14 @@ impl StartingArm {
         }
         let Some(urdf) = request.urdf else { return Self::to_start_from(request.robot.unwrap_or(KINDS[0])) };
         let (label, text) = read(urdf)?;
-        let UrdfOutline { base, sliding } = urdf_outline(RobotFileText { label: &label, text: &text }, request.tip)?;
+        let UrdfOutline { base, sliding, notes } = urdf_outline(RobotFileText { label: &label, text: &text }, request.tip)?;
         let chain = format!("the chain from `{base}` to `{}` has {}", request.tip, counted(sliding.len(), "joint"));
         Ok(Self {
             text: Some(robots::of_urdf(&base, request.tip)),
             joints: sliding.len(),
             sliding,
             counting: None,
+            notes,
             other: ("--tip", format!("{chain}, the recording {{}}; name the last link that moves, or one fixed to it")),
         })
     }
@@ -56,6 +59,7 @@ impl StartingArm {
             joints: sliding.len(),
             sliding,
             counting: read.about.counting(),
+            notes: Vec::new(),
             other: ("robot.yaml", format!("{label} has {own}, the recording {{}}; put the robot of the recording there")),
         })
     }
@@ -67,6 +71,7 @@ impl StartingArm {
             joints,
             sliding: Vec::new(),
             counting: kind.counting()?,
+            notes: Vec::new(),
             other: ("--robot", format!("{name} has {}, the recording {{}}; choose another kind", counted(joints, "joint"))),
         })
     }

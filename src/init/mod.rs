@@ -49,6 +49,8 @@ pub struct StarterFiles {
     pub accounts: Vec<(PathBuf, String)>,
     /// What no recording has.
     pub missing: Vec<&'static str>,
+    /// What a person should know of the robot, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl StarterFiles {
@@ -94,5 +96,6 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         } else {
             unknown.filter(|(_, missing)| *missing).map(|(what, _)| what).collect()
         },
+        notes: arm.notes,
     })
 }

@@ -47,6 +47,9 @@ impl Stage for CompareTorques {
             return Err(Error::spec("reads", message));
         }
         let robot = reads.robot.to_description()?;
+        for parameters in [&reads.earlier_parameters, &reads.parameters] {
+            parameters.must_be_of(&robot)?;
+        }
         let (mut arm, _) = dynamic_arm(&robot)?;
         let (first, second) = (reads.earlier_parameters.to_model()?, reads.parameters.to_model()?);
         let whole = |model: &TorqueModel| (0..model.joints()).all(|link| model.is_whole(link));

@@ -12,6 +12,7 @@ use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::misplaced_tool::misplaced_tool;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
+use crate::stage::unmoved::must_move;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
@@ -149,6 +150,7 @@ impl Stage for Diagnose {
             let message = format!("{} measured rows to fit do not even place the robot: at least {FEWEST} are needed", fit.len());
             return Err(Error::data("table recording", message));
         }
+        must_move(&data, &fit)?;
         let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && measured(row)).collect();
         let (robot, _) = gauge(RobotModel::new(reads.robot.to_description()?), &data, &fit, &BTreeMap::new())
             .map_err(|message| Error::data("table recording", message))?;

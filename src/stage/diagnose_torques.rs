@@ -2,7 +2,7 @@
 
 use crate::dynamics::{TorqueQuestion, TorqueSource, diagnose};
 use crate::error::{Error, Fault, Result, counted};
-use crate::stage::dynamic_arm::dynamic_arm;
+use crate::stage::dynamic_arm::{dynamic_arm, must_be_bodies};
 use crate::stage::torque_signal::{HeldOut, RecordedTorques};
 use crate::stage::{Chunks, Context, Stage, reads, writes};
 use crate::table::{
@@ -140,6 +140,7 @@ impl Stage for DiagnoseTorques {
 
     fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
         let robot = reads.robot.to_description()?;
+        must_be_bodies(&robot)?;
         let (mut arm, notes) = dynamic_arm(&robot)?;
         notes.into_iter().for_each(|note| context.services.note(note));
         let free = self.inertials == InertialSetting::Free;
@@ -175,7 +176,7 @@ impl Stage for DiagnoseTorques {
             inertials: Inertials::of(&diagnosis),
             contacts: Contacts::of(&diagnosis),
             consistency: BodyConsistencies::of(&diagnosis),
-            parameters: TorqueParameters::of(&diagnosis.model)?,
+            parameters: TorqueParameters::of(&diagnosis.model)?.of_robot(&robot),
             covariance: TorqueCovariance::of(&diagnosis.model)?,
         })
     }

@@ -3,6 +3,7 @@
 use crate::description::{InertiaMoments, JointDescription, JointKind, RobotDescription};
 use crate::dynamics::{DynamicArm, Inertial, InertialTolerance};
 use crate::error::{Error, Result};
+use crate::robot::import::impossible_inertia;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// How far masses may be off where the robot file does not say it: those of CAD models and of data sheets.
@@ -64,6 +65,18 @@ pub(crate) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<S
         tolerance,
     };
     Ok((arm, notes))
+}
+
+/// Fails where no body has the declared moments of inertia of a link: the torques of such an arm are no arm's.
+pub(crate) fn must_be_bodies(robot: &RobotDescription) -> Result<()> {
+    let links = (1..).zip(&robot.inertias.links).map(|(link, moments): (usize, _)| (format!("link {link}"), moments));
+    for (body, moments) in links.chain([("the payload".to_string(), &robot.inertias.payload)]) {
+        if let Some(message) = moments.as_ref().and_then(impossible_inertia) {
+            let message = format!("{body}: {message}; correct it in the robot file: torques depend on it, positions do not");
+            return Err(Error::data("table robot", message));
+        }
+    }
+    Ok(())
 }
 
 fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Inertial {

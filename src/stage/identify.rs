@@ -13,6 +13,7 @@ use crate::stage::brought;
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::known_cell::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
 use crate::stage::screened::{fit_rows, numbered};
+use crate::stage::unmoved::{self, must_move};
 use crate::stage::weightless::weightless_links;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
@@ -100,6 +101,7 @@ impl Stage for Identify {
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
         let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
+        must_move(&data, &rows)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
         self.question_setup(&robot, &data, &rows, &reads, context);
         let setting = EffectContext { base, load: self.load.into() };
@@ -161,6 +163,7 @@ impl Identify {
         if !self.effects.iter().any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
             return;
         }
+        unmoved::told(robot, data, rows).into_iter().for_each(|line| context.services.warn(line));
         let fit: Vec<usize> = rows.iter().copied().filter(|row| data.has_point(*row)).collect();
         let question = Question {
             robot,

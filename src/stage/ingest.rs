@@ -15,6 +15,7 @@ mod columns;
 mod copies;
 mod cut;
 pub mod encoding;
+mod external;
 mod feather;
 mod fields;
 mod fingerprint;

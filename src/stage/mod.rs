@@ -38,6 +38,7 @@ mod stored;
 mod text_file;
 mod torque_signal;
 mod transfer;
+mod unmoved;
 mod validate;
 mod weightless;
 
@@ -47,7 +48,7 @@ pub use diagnose::{Diagnose, DiagnoseReads};
 pub use diagnose_torques::{
     ConsistencySetting, DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting,
 };
-pub(crate) use dynamic_arm::{dynamic_arm, torque_per_ampere};
+pub(crate) use dynamic_arm::{dynamic_arm, must_be_bodies, torque_per_ampere};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};

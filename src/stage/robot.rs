@@ -50,7 +50,7 @@ writes! {
 impl Stage for ReadRobot {
     const NAME: &'static str = "robot";
     const SUMMARY: &'static str = "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = RobotReads;
     type Writes = RobotWrites;
 

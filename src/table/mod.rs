@@ -91,6 +91,7 @@ mod point;
 mod prediction;
 mod recording;
 mod robot;
+mod robot_identity;
 mod split;
 mod standing;
 mod statistics;

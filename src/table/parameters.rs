@@ -105,11 +105,13 @@ impl Parameters {
                     remark,
                     form: form.clone(),
                     corrects: None,
+                    robot: None,
+                    kinematics: None,
                 });
             }
         }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
-        Self(rows)
+        Self(rows).of_robot(model.robot.description())
     }
 
     /// The same with what would show a parameter (by name) added to its remark.
@@ -155,7 +157,7 @@ impl Parameters {
     }
 
     /// The model that these parameters make of `robot`, with all effects that a diagnosis added, and `more` effects of the whole arm
-    /// at zero. Fails where a row names an unknown effect or parameter.
+    /// at zero. Fails where a row names an unknown effect or parameter, or the table is the model of another robot.
     pub fn model(&self, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         self.model_standing(self.base_pose(), robot, more, load)
     }
@@ -174,6 +176,7 @@ impl Parameters {
 
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
     pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
+        self.must_be_of(robot.description())?;
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
         let compliance = self.0.iter().find(|row| row.effect == names::JOINT_COMPLIANCE && row.form.is_none());
         let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
@@ -321,6 +324,8 @@ mod tests {
             remark: remark.map(String::from),
             form: None,
             corrects: None,
+            robot: None,
+            kinematics: None,
         };
         let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
         for remark in [None, Some("moves with another")] {

@@ -67,6 +67,8 @@ impl TorqueParameters {
                 sigma,
                 rms_nm: None,
                 form: None,
+                robot: None,
+                kinematics: None,
             });
         }
         for term in &model.terms {
@@ -76,14 +78,41 @@ impl TorqueParameters {
                 let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
                 let (effect, place) = (term.effect.clone(), term.place.to_string());
                 let (rms_nm, form) = (Some(term.rms), Some(form.clone()));
-                rows.push(TorqueParameterRow { name, effect, place, quantity, value: *value, unit, sigma, rms_nm, form });
+                let (robot, kinematics) = (None, None);
+                let value = *value;
+                rows.push(TorqueParameterRow {
+                    name,
+                    effect,
+                    place,
+                    quantity,
+                    value,
+                    unit,
+                    sigma,
+                    rms_nm,
+                    form,
+                    robot,
+                    kinematics,
+                });
             }
         }
         for term in &model.terms {
             for (value, (name, unit, sigma)) in term.shape_numbers()?.into_iter().zip(numbers.by_ref()) {
                 let quantity = name.rsplit('.').next().unwrap_or_default().to_string();
                 let (effect, place) = (term.effect.clone(), term.place.to_string());
-                rows.push(TorqueParameterRow { name, effect, place, quantity, value, unit, sigma, rms_nm: None, form: None });
+                let (rms_nm, form, robot, kinematics) = (None, None, None, None);
+                rows.push(TorqueParameterRow {
+                    name,
+                    effect,
+                    place,
+                    quantity,
+                    value,
+                    unit,
+                    sigma,
+                    rms_nm,
+                    form,
+                    robot,
+                    kinematics,
+                });
             }
         }
         rows.extend(seen(model));
@@ -180,6 +209,8 @@ fn seen(model: &TorqueModel) -> Vec<TorqueParameterRow> {
         sigma: None,
         rms_nm: None,
         form: None,
+        robot: None,
+        kinematics: None,
     };
     let whole = WHOLE.iter().zip([model.sign_width, model.latency, model.cutoff, model.friction_lead]);
     let whole = whole.map(|(named, value)| row(format!("{SEEN}.{}", named.0), Place::Recording, *named, value));
@@ -279,6 +310,8 @@ mod tests {
             sigma,
             rms_nm: Some(1.0),
             form: Some("{}".into()),
+            robot: None,
+            kinematics: None,
         };
         let all = TorqueParameters(vec![row(1, 6.0, Some(0.1)), row(2, 0.2, Some(0.1)), row(4, 2.0, None)]);
         assert_eq!(all.dry_friction(4), [Some(6.0), None, None, Some(2.0)]);

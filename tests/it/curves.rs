@@ -67,6 +67,8 @@ fn curves_of(
                 remark: None,
                 form: Some(text.clone()),
                 corrects: None,
+                robot: None,
+                kinematics: None,
             });
         }
     }

@@ -3,6 +3,7 @@
 mod blocks;
 mod clocks;
 mod counting;
+mod external;
 mod feather;
 mod foreign;
 mod kinds;

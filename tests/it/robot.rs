@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 // m: 1e-9 mm.
@@ -118,6 +119,36 @@ links: [{mass: 120, centre: [0.1, 0.2, 0.3]}, null, {mass: 0, centre: [0, 0, 0]}
 payload: {mass: 6, offset: [0.05, 0, 0], frame: tool}
 gravity: [0.6, 0, -9.79]
 ";
+
+#[test]
+fn axes_that_are_nearly_parallel_stand_at_the_arm_whose_kinematics_they_keep() {
+    let robot = read(crate::whose_model::FACTORY);
+    // The common normal of axes 2 and 3 is 574 m away.
+    assert!(robot.joints.iter().all(|joint| Vector3::from(joint.point).norm() < 1.0), "{:?}", robot.joints);
+    let model = RobotModel::new(robot.clone());
+    // By the driver's own forward kinematics, mm.
+    for (q, tool) in [
+        ([0.0; 6], [-816.8671, -193.4799, -6.5127]),
+        ([0.0, -FRAC_PI_2, 0.0, -FRAC_PI_2, 0.0, 0.0], [-0.3026, -193.5150, 1001.0569]),
+        ([0.5, -1.2, 1.4, -1.8, -1.57, 0.3], [-504.4739, -401.9760, 327.1429]),
+        ([1.0, -2.0, -1.0, 0.5, 1.0, 2.0], [435.3477, 390.9226, 648.9325]),
+    ] {
+        let found = model.forward(&q).translation * 1e3;
+        assert!((found - Vector3::from(tool)).amax() < 1e-4, "{found} instead of {tool:?}");
+    }
+    let back = Robot::from_description(&robot).to_frame().and_then(|frame| Robot::from_frame(&frame)).expect("a table");
+    assert!(distance(&back.to_description().expect("a robot"), &robot) < 1e-12);
+    // Points along an axis make no difference: the same table with the axes where the convention puts them.
+    let mut far = robot.clone();
+    for joint in &mut far.joints {
+        joint.point = (Vector3::from(joint.point) + Vector3::from(joint.axis) * 500.0).into();
+    }
+    let far = RobotModel::new(far);
+    for k in 0..200 {
+        let q: Vec<f64> = (0..6).map(|j| 2.0 * (1.3 * f64::from(k) + 0.7 * f64::from(j)).sin()).collect();
+        assert!((far.forward(&q).translation - model.forward(&q).translation).norm() < EXACT, "{q:?}");
+    }
+}
 
 #[test]
 fn a_robot_file_gives_what_it_says() {

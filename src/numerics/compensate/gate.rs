@@ -82,14 +82,18 @@ impl Gate {
         beyond(command.turn, turn).then(|| format!("turned by {by:.3} deg, at most {most} deg allowed (--max-turn)"))
     }
 
-    /// What of a model is further from the robot file than allowed, a sentence each. Targets that the robot file names apart from its
-    /// tool are of the measurement, and free.
+    /// What of a model is further from the robot file than allowed, a sentence each. Targets with a name of their own are of the
+    /// measurement, and free; the one without is the robot's tool, whether its orientation was measured or not.
     pub fn beyond(&self, model: &Model) -> Vec<String> {
         const BY_FILE: [&str; 3] = [names::TOOL_OFFSET, names::JOINT_OFFSET, names::LINK_GEOMETRY];
-        let measured_apart = !model.robot.setup().targets.is_empty();
-        let held = |name: &str| BY_FILE.contains(&name) && !(name == names::TOOL_OFFSET && measured_apart);
-        let specs = model.stack.specs();
+        let (robot, specs) = (&model.robot, model.stack.specs());
+        let placed = !robot.setup().targets.is_empty();
+        let held = |name: &str| BY_FILE.contains(&name) && !(name == names::TOOL_OFFSET && placed);
         let mut distances: BTreeMap<String, (f64, f64)> = BTreeMap::new();
+        if let Some(target) = robot.setup().target("") {
+            let off = robot.mounting(Some(target)).translation - robot.home().translation;
+            distances.insert("tool".into(), (off.norm_squared(), 0.0));
+        }
         for (effect, range) in model.stack.effects().filter(|(effect, _)| held(effect.name())) {
             for k in range {
                 let place = specs[k].place;

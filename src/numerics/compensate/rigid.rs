@@ -92,12 +92,18 @@ pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
     out
 }
 
-/// Rms and maximum (m) of how far `description` puts the tool from where the model does, over the rows of `data`.
+/// Rms and maximum (m) of how far `description` puts what the rows of `data` measured from where the model does.
 pub fn distance(model: &Model, description: &RobotDescription, data: &Measurements) -> (f64, f64) {
+    let nominal = &model.robot;
     let robot = RobotModel::new(description.clone());
+    let body = *robot.home() * nominal.tool_at(nominal.setup().target("")).inverse();
     let base = model.base();
     let whole = model.predict(data);
-    apart(whole.iter().enumerate().map(|(row, point)| (base.point(&robot.forward(data.q(row)).translation) - point).norm()))
+    let off = |(row, point): (usize, &Vector3<f64>)| {
+        let mounting = body.point(&nominal.mounting_at(data, row).translation);
+        (base.point(&robot.last_body(data.q(row)).point(&mounting)) - point).norm()
+    };
+    apart(whole.iter().enumerate().map(off))
 }
 
 fn apart(lengths: impl Iterator<Item = f64>) -> (f64, f64) {

@@ -7,6 +7,8 @@ criteria! {
     "setup";
     /// A nominal robot leaves less than this share of its reach, and of the size of the measured cloud.
     NOMINAL: f64 = 0.02, "share", "physics: nominal robots err by millimetres in metres", "";
+    /// The same of a robot that is set up rightly: what more than one error, or a number, is told by must leave no more of its reach.
+    GOOD: f64 = 0.005, "share of the reach", "physics: zeros are off by tenths of a degree, lengths by millimetres in metres", "";
     /// A robot that is set up rightly leaves less than this share of the measured cloud: joints that hardly move agree with
     /// points that hardly move, however wrong both are.
     CLOUD: f64 = 0.1, "share", "judgement: a tenth", "";
@@ -21,6 +23,12 @@ criteria! {
     SAME: f64 = 1.02, "ratio", "judgement: rounding of fits", "";
     /// Set-up errors that are tried together with another where none explains alone.
     SECOND: usize = 6, "errors", "judgement: bounds time", "";
+    /// Points by which countings of all joints are compared before they are placed.
+    SCREENED: usize = 60, "rows", "judgement: bounds time", "";
+    /// A zero that is this near to quarter turns is counted from there, whatever it is off by beyond that.
+    QUARTERLY: f64 = 5.0, "deg", "physics: zeros are mastered to degrees at worst", "";
+    /// Countings that are placed.
+    COUNTINGS: usize = 16, "countings", "count: mirror images and turned wrists of one counting, twice", "";
     /// What no arm's length is off by when it is made, as a share of itself.
     LENGTH: f64 = 0.02, "share", "physics: links are made to a tenth of a percent", "";
     /// The same of a short length, as a share of the reach.

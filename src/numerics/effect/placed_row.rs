@@ -111,10 +111,10 @@ impl PlacedRow<'_> {
         })
     }
 
-    /// The tool frame, and the velocity (v; w) of its origin by each joint.
+    /// The tool frame at the row's target, turned as the robot file has it, and the velocity (v; w) of its origin by each joint.
     pub(crate) fn tool(&self, velocities: &mut [Twist]) -> Pose {
         let behind = &self.scratch.posture.behind;
-        let tool = behind[self.robot.joints()] * *self.robot.home();
+        let tool = behind[self.robot.joints()] * self.robot.tool_at(self.scratch.target);
         for (joint, velocity) in velocities.iter_mut().enumerate() {
             *velocity = self.robot.velocity(joint, &behind[joint], &tool.translation);
         }

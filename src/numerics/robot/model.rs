@@ -61,6 +61,11 @@ impl RobotModel {
         target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.mounting)
     }
 
+    /// The tool frame where a target (by number) sits: how an instrument's frame is turned against the tool belongs to the instrument.
+    pub fn tool_at(&self, target: Option<usize>) -> Pose {
+        Pose::new(self.home.rotation, self.mounting(target).translation)
+    }
+
     /// How the target that a row measured is mounted on the last body.
     pub fn mounting_at(&self, data: &Measurements, row: usize) -> &Pose {
         self.mounting(self.setup.target(data.target(row)))

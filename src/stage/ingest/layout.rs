@@ -144,7 +144,7 @@ pub enum Duplicates {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitPolicy {
-    /// Used, with a warning that counts them; most rows beyond the limits is an error.
+    /// Used, with a warning that counts them; an error where most rows are beyond and the joints may be in another unit.
     #[default]
     Warn,
     /// Rejected.

@@ -25,7 +25,7 @@ const STRIDE: u64 = 4096;
 const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &feather::FORMAT, &lines::FORMAT];
 
 /// Opens a file of any kind.
-fn open(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+pub(super) fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
     let mut reader = BufReader::with_capacity(BUFFER, source.reader);
     let head = reader.fill_buf().map_err(|error| failed(&source.label, &error))?;
     let ending = raw::ending(Path::new(&source.label));
@@ -69,13 +69,15 @@ pub(super) struct OpenedFile {
     pub rows: JudgedFile,
     /// What was left out of the file as a whole.
     remark: Option<String>,
+    /// Columns that nothing is read from, with their names.
+    pub unmapped: Vec<(usize, String)>,
     pub row: RecordedRow,
 }
 
 impl OpenedFile {
     /// Opens a file and finds its columns.
     pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &Arc<RobotJoints>, limits: LimitPolicy) -> Result<Self> {
-        let mut rows = open(source, layout)?;
+        let mut rows = records(source, layout)?;
         let label = rows.label().to_string();
         let (header, decimal) = if rows.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
         let mut record = RecordFields::default();
@@ -103,9 +105,11 @@ impl OpenedFile {
         }
         let binding = bind(layout, &head, arm)?;
         let row = RecordedRow::of(&binding, arm);
+        let names = head.names.into_iter().flatten().enumerate();
+        let unmapped = names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column)).collect();
         let (remark, first) = (rows.remark(), (!header).then_some(record));
         let rows = JudgedFile::new(rows, first, RowReader::new(binding, decimal, limits, arm));
-        Ok(Self { label, rows, remark, row })
+        Ok(Self { label, rows, remark, unmapped, row })
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {

@@ -5,6 +5,7 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
+use super::external;
 use super::fingerprint::{Fingerprints, behind};
 use super::ids::{FileIds, narrow};
 use super::layout::{FileLayout, Join};
@@ -103,6 +104,8 @@ pub(super) struct Scan {
     pub beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
     pub largest: f64,
+    /// Least and largest position of each joint, rad or m.
+    pub ranges: Vec<[f64; 2]>,
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
     /// Hash of what all its usable rows say, of a file with what was measured.
@@ -130,10 +133,15 @@ impl Scan {
             turns: FileOddities::default(),
             beyond: FileOddities::default(),
             largest: 0.0,
+            ranges: Vec::new(),
             track: None,
             measured: None,
             first_ids: Vec::new(),
         }
+    }
+    /// How far a joint turns over the rows at most, rad or m.
+    pub(super) fn largest_turn(&self) -> f64 {
+        self.ranges.iter().map(|[least, most]| most - least).fold(0.0, f64::max)
     }
     pub(super) fn refused(&self) -> u64 {
         self.tally.values().map(|count| count.rows).sum()
@@ -161,6 +169,7 @@ pub(super) fn open(settings: &Ingest, layout: &FileLayout, arm: &Arc<RobotJoints
     let source = context.services.open(&layout.file)?;
     let size = source.size;
     let reading = OpenedFile::open(source, layout, arm, settings.limits)?;
+    external::must_stand(&reading, layout, arm, context)?;
     for remark in reading.remarks() {
         context.services.note(format!("{}: {remark}", reading.label));
     }
@@ -265,6 +274,10 @@ impl Scan {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
             self.largest = self.largest.max(value.abs());
+        }
+        self.ranges.resize(q.len(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for (value, [least, most]) in q.iter().zip(&mut self.ranges) {
+            (*least, *most) = (least.min(*value), most.max(*value));
         }
         if let Some(joint) = row.beyond {
             self.beyond.count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));

@@ -14,6 +14,12 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
 const SMALL_IN_DEGREES: f64 = 6.5;
 
+/// What most rows beyond the limits are a sign of.
+const COUNTED: &str = ": the controller may count its joints otherwise than the robot file (`sign`, `zero`, `coupled` of `q`), or the columns stand in \
+                       another order";
+/// Joints that are recorded for calibration turn by more, rad.
+const FAR: f64 = 2.0;
+
 /// Rows of a file that become part of the recording.
 pub(super) fn accepted(scan: &Scan, decision: &FileDecision) -> u64 {
     if decision.partners.is_empty() {
@@ -87,6 +93,8 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJ
     if limits == LimitPolicy::Warn
         && scan.beyond.rows * 2 > judged
         && let Some((line, joint, value)) = scan.beyond.first
+        // Joints that turn this far are in the unit that is declared, whatever they are counted from.
+        && (arm.prismatic.get(joint) == Some(&true) || unit != "deg" && scan.largest_turn() < FAR)
     {
         let degrees = if unit == "deg" { "" } else { "; if the file holds degrees, say `unit: deg`" };
         let message = format!(
@@ -209,10 +217,11 @@ fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, 
         && let Some((line, joint, value)) = scan.beyond.first
     {
         context.services.warn(format!(
-            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, {}",
+            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, {}{}",
             scan.label,
             counted(scan.beyond.rows, "row"),
-            arm.beyond(joint, value)
+            arm.beyond(joint, value),
+            if 2 * scan.beyond.rows > scan.used() { COUNTED } else { "" }
         ));
     }
     let degrees = columns.joint("q").is_some_and(|q| q.unit.as_deref() == Some("deg"));

@@ -382,3 +382,44 @@ fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
     said(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
     said(|row| row % 2 == 1, "1, 3, 5, 7, ... (36 rows)", "2, 4, 6, 8, ... (36 rows)");
 }
+
+/// A maker's counting: signs, what is shown at the robot file's zeros in quarters of a turn, and whether joint 3 holds joint 2's angle; what is
+/// said of it where no other counting is the same by kinematics.
+type MakersCounting = (&'static str, [f64; 6], [f64; 6], f64, &'static [&'static str]);
+
+#[test]
+fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
+    let countings: [MakersCounting; 4] = [
+        (
+            "signs of 2, 3 and 5, 90 deg at 2",
+            [1.0, -1.0, -1.0, 1.0, -1.0, 1.0],
+            [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+            0.0,
+            &["sign: [1, -1, -1, 1, -1, 1]", "zero: [0, 90, 0, 0, 0, 0]"],
+        ),
+        ("signs of 1, 4 and 6, zeros of 2 and 3", [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0], [0.0, -1.0, 1.0, 0.0, 0.0, 0.0], 0.0, &[]),
+        ("sign of 3, joint 3 plus joint 2", [1.0, 1.0, -1.0, 1.0, 1.0, 1.0], [0.0; 6], 1.0, &[]),
+        ("zeros of 2, 3 and 5", [1.0; 6], [0.0, 1.0, 2.0, 0.0, -1.0, 0.0], 0.0, &[]),
+    ];
+    for (robot, seed) in arms().iter().zip([61, 62, 63]) {
+        let sound = recorded(robot, seed, json!([]));
+        for (name, sign, zero, coupled, texts) in &countings {
+            let mut inputs = sound.clone();
+            joints(&mut inputs, |q| {
+                q[2] += coupled * q[1];
+                q.iter_mut().zip(sign.iter().zip(zero)).for_each(|(q, (sign, zero))| *q = sign * *q + zero * FRAC_PI_2);
+            });
+            // Two wrong points of 72 change nothing.
+            inputs.recording.position[5][0] += 0.4;
+            inputs.recording.position[30][2] -= 0.9;
+            let said = diagnosed(&inputs).unwrap_or_else(|error| panic!("{} {name}: {error}", robot.name));
+            assert_eq!(said.verdict, "wrong_setup", "{} {name}: {}", robot.name, said.statement);
+            let statement = &said.findings[0].statement;
+            println!("{} {name}: {statement}", robot.name);
+            assert!(!statement.contains("master"), "{} {name}: {statement}", robot.name);
+            assert!(texts.iter().all(|text| statement.contains(text)), "{} {name}: {statement}", robot.name);
+            let after = statement.split("without it ").nth(1).and_then(|text| text.split(" mm").next()).expect("a length");
+            assert!(after.parse::<f64>().expect("mm") < 12.0, "{} {name}: {statement}", robot.name);
+        }
+    }
+}

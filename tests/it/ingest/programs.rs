@@ -48,7 +48,9 @@ fn degrees(row: &[f64]) -> Vec<f64> {
 
 #[test]
 fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_counted() {
-    let desk = desk("cell.MOD", RAPID, "more{2},1,2,3\nmore{1},4,5,6\np10,7,8,16\n");
+    // A track that is not a joint of the robot file stands.
+    let rapid = RAPID.replace("[0.5,", "[1500,");
+    let desk = desk("cell.MOD", &rapid, "more{2},1,2,3\nmore{1},4,5,6\np10,7,8,16\n");
     let taken = take(&desk, &joined("cell.MOD", "rax_#"), robot("rrrrrr", 1.0)).expect("a recording");
     assert_eq!(taken.recording.point_id, ["p10", "more{1}", "more{2}"]);
     assert_eq!(degrees(taken.recording.q(0)), [0.0, -12.5, 20.0, 0.0, 30.0, -90.0]);

@@ -86,6 +86,8 @@ fn parameter(
         remark: remark.map(str::to_owned),
         form: None,
         corrects: None,
+        robot: None,
+        kinematics: None,
     }
 }
 

@@ -1,8 +1,7 @@
 //! Least squares by a pivoted Cholesky factor of a small Gram matrix: what the data do not see is left out.
 
 use super::linear::INVISIBLE;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par};
+use faer::Mat;
 
 /// A pivoted Cholesky factor of a small Gram matrix: what is below [`INVISIBLE`] is left out.
 pub(super) struct PivotedCholesky {

@@ -1,5 +1,6 @@
 //! Every set-up error of the list tried: the recording without it, base and tool aligned anew, and what is left compared.
 
+use super::counting::Counting;
 use super::manufacture::{ANGLE, length_error};
 use super::mixture::{TwoSetups, is_in_parts};
 use super::number::FreeNumber;
@@ -7,7 +8,7 @@ use super::order::RowOrder;
 use super::pairs::{PointPairs, sampled};
 use super::placement::{Placement, place};
 use super::wrong::WrongSetup;
-use crate::criteria::setup::{ALIKE, BETTER, CLOUD, NOMINAL, OWN_NUMBERS, SAME, SECOND};
+use crate::criteria::setup::{ALIKE, BETTER, CLOUD, GOOD, NOMINAL, OWN_NUMBERS, SAME, SECOND};
 use crate::diagnose::types::Question;
 use crate::robot::RobotModel;
 use nalgebra::Vector3;
@@ -27,6 +28,7 @@ pub(super) struct AsStated<'a> {
 }
 
 /// Set-up errors that together explain what the nominal robot leaves, those that explain as well, and what is left without them.
+#[derive(Clone)]
 pub(super) struct ExplainedSetup {
     pub wrong: Vec<WrongSetup>,
     pub alike: Vec<WrongSetup>,
@@ -92,7 +94,10 @@ impl<'a> AsStated<'a> {
         let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
         let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
         let own = if number.is_some() { *OWN_NUMBERS } else { 1.0 };
-        let explains = counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < *NOMINAL * pairs.reach();
+        // One error of the list is found by its kind; what has more freedom must leave what a robot that is set up rightly does.
+        let is_free = number.is_some() || wrong.len() > 1 || matches!(wrong[..], [WrongSetup::Counting(_)]);
+        let most = if is_free { *GOOD } else { *NOMINAL } * pairs.reach();
+        let explains = counts && *BETTER * own * share < self.share() && share < *CLOUD && placed.left < most;
         Try { wrong, placed, share: own * share, explains }
     }
 
@@ -105,13 +110,19 @@ impl<'a> AsStated<'a> {
         is_right.then(|| found.of_all(&of(&self.rows), &self.rows))
     }
 
-    /// What explains it: one set-up error, else two.
+    /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else two.
     pub fn explained(&self) -> Option<ExplainedSetup> {
         let data = self.question.data;
         let in_order = PointPairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
         let all = WrongSetup::all(&in_order);
         let mut one: Vec<Try> = all.par_iter().map(|wrong| self.tried(vec![*wrong])).collect();
-        if let Some(found) = chosen(&one) {
+        let first = chosen(&one);
+        if let Some(found) = first.as_ref().filter(|found| found.placed.left < *GOOD * self.reach) {
+            return Some(found.clone());
+        }
+        let countings = Counting::likely(&self.mended(&[]));
+        let counted: Vec<Try> = countings.par_iter().map(|one| self.tried(vec![WrongSetup::Counting(*one)])).collect();
+        if let Some(found) = chosen(&counted).or(first) {
             return Some(found);
         }
         one.sort_by(|a, b| a.share.total_cmp(&b.share));
@@ -131,7 +142,10 @@ fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
     let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
     let least = explaining.iter().map(|tried| tried.share).fold(f64::INFINITY, f64::min);
     let best = explaining.iter().find(|tried| tried.share <= *SAME * least)?;
-    let is_rival = |tried: &&&Try| tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1;
+    // Countings that leave the same are the same by kinematics.
+    let is_same = |tried: &Try| matches!(tried.wrong[..], [WrongSetup::Counting(_)]) && tried.share <= *SAME * least;
+    let is_rival =
+        |tried: &&&Try| tried.wrong != best.wrong && tried.share < *ALIKE * least && tried.wrong.len() == 1 && !is_same(tried);
     let alike = explaining.iter().filter(is_rival).map(|tried| tried.wrong[0]).collect();
     Some(ExplainedSetup { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
 }

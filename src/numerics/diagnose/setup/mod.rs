@@ -5,6 +5,7 @@
 //! frames of base and tool are fitted, so that no convention of theirs can be wrong here.
 
 mod compare;
+mod counting;
 mod manufacture;
 mod mixture;
 mod number;

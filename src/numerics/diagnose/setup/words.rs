@@ -1,9 +1,10 @@
 //! Set-up errors in the words of an engineer, each with what mends it.
 
+use super::counting::{CountedJoint, Counting, MOST};
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
-use crate::criteria::setup::{ARMS, SMALL};
+use crate::criteria::setup::{ARMS, QUARTERLY, SMALL};
 use crate::effect::figure;
 use crate::error::counted;
 use crate::robot::{RobotModel, numbered};
@@ -76,6 +77,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
                 format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
+        WrongSetup::Counting(counting) => return of_counting(counting, joints),
         WrongSetup::Coupled { moved, by, sign } => {
             let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
             let (moved, by) = (moved + 1, by + 1);
@@ -91,7 +93,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             "in `ingest`: exchange the columns of `x` and `y`; since the base is fitted, this corrects both cases".into(),
         ),
         WrongSetup::Order(order) => return of_order(order),
-        WrongSetup::Number(number) => return of_number(number, values),
+        WrongSetup::Number(number) => return of_number(number, values, joints),
     };
     SetupWords::of(what, mend)
 }
@@ -126,6 +128,40 @@ fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
             signs.join(", ")
         ),
     )
+}
+
+/// Signs, zeros and couplings of all joints.
+fn of_counting(counting: Counting, joints: usize) -> SetupWords {
+    let all: Vec<(usize, CountedJoint)> = counting.joints().iter().copied().enumerate().take(joints).collect();
+    let reversed: Vec<usize> = all.iter().filter(|(_, own)| own.reversed).map(|(joint, _)| *joint).collect();
+    let list = |of: &dyn Fn(&CountedJoint) -> i32| all.iter().map(|(_, own)| of(own).to_string()).collect::<Vec<_>>().join(", ");
+    let (mut what, mut mend) = (Vec::new(), Vec::new());
+    if !reversed.is_empty() {
+        what.push(of_signs(&reversed, joints).0);
+        mend.push(format!("sign: [{}]", list(&|own| if own.reversed { -1 } else { 1 })));
+    }
+    let turned = all.iter().filter(|(_, own)| own.quarters != 0);
+    let zeros =
+        turned.map(|(joint, own)| format!("the recording reads {} deg at the zero of joint {}", 90 * own.quarters, joint + 1));
+    what.extend(zeros);
+    let in_degrees = what.len() > usize::from(!reversed.is_empty());
+    if in_degrees {
+        mend.push(format!("zero: [{}]", list(&|own| 90 * own.quarters)));
+    }
+    let coupled: Vec<(usize, i32)> =
+        all.iter().filter(|(_, own)| own.coupled != 0).map(|(joint, own)| (joint + 1, own.coupled)).collect();
+    if !coupled.is_empty() {
+        let how = |ratio: i32| if ratio < 0 { "minus" } else { "plus" };
+        what.extend(coupled.iter().map(|(joint, ratio)| {
+            let (how, by) = (how(*ratio), joint - 1);
+            format!("joint {joint} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it")
+        }));
+        let each: Vec<String> =
+            coupled.iter().map(|(joint, ratio)| format!("{{joint: {joint}, by: {}, ratio: {ratio}}}", joint - 1)).collect();
+        mend.push(format!("coupled: [{}]", each.join(", ")));
+    }
+    let degrees = if in_degrees { ", in deg" } else { "" };
+    SetupWords::of(what.join(", and "), format!("in `ingest`: `columns: {{q: {{.., {}}}}}`{degrees}", mend.join(", ")))
 }
 
 fn unit_name(unit: &str) -> &'static str {
@@ -184,7 +220,7 @@ fn of_order(order: RowOrder) -> SetupWords {
     SetupWords::of(what, mend.into())
 }
 
-fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
+fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
     let (what, mend) = match number {
         FreeNumber::Length(joint) => (
             format!(
@@ -205,6 +241,13 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
         ),
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
+            let quarters = (-degrees / 90.0).round() as i32;
+            let rest = -degrees - 90.0 * f64::from(quarters);
+            if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
+                let SetupWords { what, mend, .. } = of_counting(Counting::of_a_zero(joint, quarters), joints);
+                let what = format!("{what}, which is {} deg off beyond that", figure(rest, 2));
+                return SetupWords::of(what, mend);
+            }
             (
                 format!("the zero of joint {} is off by {} deg, more than manufacture allows", joint + 1, figure(degrees, 2)),
                 format!("master joint {} again, or correct its zero in the robot file", joint + 1),

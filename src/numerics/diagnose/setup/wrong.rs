@@ -1,5 +1,6 @@
 //! The closed list of set-up errors, and what a recording is without one.
 
+use super::counting::Counting;
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::pairs::PointPairs;
@@ -26,6 +27,8 @@ pub(super) enum WrongSetup {
         quarters: i32,
         next: i32,
     },
+    /// Signs, zeros and couplings at once.
+    Counting(Counting),
     /// The angle of joint `by` times `sign` is in that of joint `moved`.
     Coupled {
         moved: usize,
@@ -82,7 +85,7 @@ impl WrongSetup {
             Self::Order(_) | Self::Exchanged(..) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
             Self::Zero(..) | Self::Zeros { .. } => 2,
-            Self::Sign(_) | Self::Signs(_) => 3,
+            Self::Sign(_) | Self::Signs(_) | Self::Counting(_) => 3,
             Self::Coupled { .. } => 4,
             Self::Number(_) => 5,
         }
@@ -116,6 +119,7 @@ impl WrongSetup {
                 q[joint + 1] -= f64::from(next) * FRAC_PI_2;
             }),
             Self::Coupled { moved, by, sign } => pairs.with_joints(|q| q[moved] -= sign * q[by]),
+            Self::Counting(counting) => pairs.with_joints(|q| counting.to_robot(q)),
             Self::Mirrored => pairs.with_points(|point| point.yxz()),
             Self::Order(_) | Self::Number(_) => pairs.clone(),
         }

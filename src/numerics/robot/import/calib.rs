@@ -10,6 +10,8 @@ use crate::units::{Quantity, Unit};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 const FORMAT: f64 = 1.0;
+/// m: a point of an axis that is farther from base and tool is nothing that anyone sees at an arm.
+const FAR: f64 = 10.0;
 const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
 
 #[derive(Clone, Copy)]
@@ -41,11 +43,12 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
     }
     let units = units(root.get("units").map(&["length", "angle"]));
     let chain = chain(root.get("kinematics").map(&FORMATS), units, urdf, &faults)?;
+    let mut notes = chain.as_ref().map(|chain| chain.notes.clone()).unwrap_or_default();
     let robot = chain.map(|chain| describe(&root, chain, units));
     let about = about::read(root.get("about"), robot.as_ref().map_or(0, |robot| robot.joints.len()), units.length);
-    faults.finish()?;
+    notes.extend(faults.finish()?);
     match robot {
-        Some(robot) => Ok(Imported { robot, notes: Vec::new(), about }),
+        Some(robot) => Ok(Imported { robot, notes, about }),
         None => Err(crate::error::Error::Bug("a robot file without kinematics had no fault".into())),
     }
 }
@@ -120,6 +123,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         }
     }
     distinct(root, &joints);
+    slide(&mut joints, &tool.translation.vector);
     let mut inertias: Vec<_> = chain.joints.iter().map(|joint| joint.body.as_ref().and_then(|body| body.inertia)).collect();
     if let Some(list) = root.get("links").given() {
         for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
@@ -147,6 +151,23 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         payload_centre: payload_centre.into(),
         gravity: root.get("gravity").given().map_or(super::GRAVITY, super::gravity),
         inertias: DeclaredInertias { links: inertias, payload: payload_inertia, tolerance },
+    }
+}
+
+/// Moves points that are far from the arm along their axes, to where each is nearest to the one before: where neighbouring axes are nearly
+/// parallel, frames of the Denavit-Hartenberg convention stand on a common normal that is anywhere. The arm moves as before.
+fn slide(joints: &mut [JointDescription], tool: &Vector3<f64>) {
+    let mut before = Vector3::zeros();
+    for joint in joints {
+        let (axis, point) = (Vector3::from(joint.axis), Vector3::from(joint.point));
+        if point.norm().min((point - tool).norm()) > FAR {
+            joint.point = match joint.kind {
+                JointKind::Revolute => (point - axis * axis.dot(&(point - before))).into(),
+                // Wherever it stands it slides alike.
+                JointKind::Prismatic => before.into(),
+            };
+        }
+        before = joint.point.into();
     }
 }
 

@@ -79,8 +79,8 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
         },
     };
     let unused = root.keys().filter(|key| !KEYS.contains(key));
-    let notes = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();
-    faults.finish()?;
+    let mut notes: Vec<String> = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();
+    notes.extend(faults.finish()?);
     Ok(Imported { robot, notes, about: super::About::default() })
 }
 

@@ -55,7 +55,7 @@ pub(super) fn read(rows: &DocumentNode, convention: DhConvention, length: Unit, 
             body: None,
         });
     }
-    FrameChain { joints, tip: frame }
+    FrameChain { joints, tip: frame, notes: Vec::new() }
 }
 
 fn rotation(axis: Vector3<f64>, angle: f64) -> Isometry3<f64> {

@@ -6,27 +6,42 @@ use crate::robot::Bound;
 use crate::units::Unit;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// How far below zero, as a share of the largest, a principal moment may come by rounding.
-const ROUNDING: f64 = 1e-6;
+/// A principal moment below this share of the largest is none.
+const NONE: f64 = 1e-6;
+/// By which share the largest principal moment may be above the sum of the others: numbers are written with two digits.
+const ROUNDING: f64 = 0.01;
 
-/// `[xx, xy, xz, yy, yz, zz]` of a file, kg m2, with a fault where no body can have them.
+/// `[xx, xy, xz, yy, yz, zz]` of a file, kg m2, with a note where no body can have them.
 pub(super) fn moments(value: &DocumentNode) -> InertiaMoments {
     let moments = value.sized_vector::<6>(Bound::Inertia, Unit::KilogramSquareMetre);
-    if let Some(message) = impossible(&moments) {
-        value.fault(message);
+    if let Some(message) = impossible_inertia(&moments) {
+        value.note(message + UNUSED);
     }
     moments
 }
 
-/// Why no body has these moments, if so.
-pub(super) fn impossible(moments: &InertiaMoments) -> Option<String> {
-    if moments.iter().any(|moment| moment.is_nan()) {
+/// What impossible moments are no hindrance for.
+pub(super) const UNUSED: &str = "; positions do not depend on it, torques are not diagnosed with it";
+
+/// Why no body has these moments, if so; a body without any moment is a point.
+pub fn impossible_inertia(moments: &InertiaMoments) -> Option<String> {
+    if moments.iter().any(|moment| !moment.is_finite()) || moments.iter().all(|moment| *moment == 0.0) {
         return None;
     }
-    let principal = tensor(moments).symmetric_eigenvalues();
-    let (least, most) = (principal.min(), principal.max());
-    (least < -ROUNDING * most.abs()).then(|| {
-        format!("no body has a negative principal moment ({least:.4} kg m2); expected [xx, xy, xz, yy, yz, zz] about the centre")
+    let mut principal: [f64; 3] = tensor(moments).symmetric_eigenvalues().into();
+    principal.sort_by(f64::total_cmp);
+    let [least, middle, most] = principal;
+    if least < NONE * most {
+        let least = if least < -NONE * most.abs() { "negative" } else { "zero" };
+        return Some(format!(
+            "no body has a principal moment of inertia that is {least}; expected [xx, xy, xz, yy, yz, zz] about the centre"
+        ));
+    }
+    (most > (1.0 + ROUNDING) * (least + middle)).then(|| {
+        let times = most / (least + middle);
+        format!(
+            "no body has a principal moment of inertia of {times:.3} times the sum of the other two; expected at most that sum"
+        )
     })
 }
 

@@ -4,6 +4,7 @@
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
 pub use about::About;
+pub use inertia::impossible_inertia;
 pub use urdf::UrdfOutline;
 
 use crate::description::{InertiaMoments, JointKind, RobotDescription};
@@ -61,6 +62,8 @@ struct FrameChain {
     joints: Vec<ChainJoint>,
     /// The frame in which the file's `tool` is given: the base for screws, the last link or tip otherwise.
     tip: Isometry3<f64>,
+    /// What a person should know of how it was read.
+    notes: Vec<String>,
 }
 
 struct ChainJoint {

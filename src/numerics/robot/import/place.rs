@@ -14,6 +14,7 @@ use std::cell::RefCell;
 pub(super) struct Faults<'f> {
     file: &'f str,
     list: RefCell<Vec<Fault>>,
+    notes: RefCell<Vec<String>>,
 }
 
 impl<'f> Faults<'f> {
@@ -22,7 +23,7 @@ impl<'f> Faults<'f> {
         let (node, troubles) = yaml::parse(file.text);
         let list: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(file.label)).collect();
         match node {
-            Some(node) => Ok((node, Self { file: file.label, list: RefCell::new(list) })),
+            Some(node) => Ok((node, Self { file: file.label, list: RefCell::new(list), notes: RefCell::default() })),
             None => Err(Error::Spec(list)),
         }
     }
@@ -40,9 +41,10 @@ impl<'f> Faults<'f> {
             Err(other) => Err(other),
         }
     }
-    pub fn finish(self) -> Result<()> {
+    /// What was noted, a sentence each with its place. Fails with all faults.
+    pub fn finish(self) -> Result<Vec<String>> {
         let list = self.list.into_inner();
-        if list.is_empty() { Ok(()) } else { Err(Error::Spec(list)) }
+        if list.is_empty() { Ok(self.notes.into_inner()) } else { Err(Error::Spec(list)) }
     }
 }
 
@@ -74,6 +76,11 @@ impl<'a> DocumentNode<'a> {
     }
     pub fn fault(&self, message: impl Into<String>) {
         self.faults.push(Trouble::new(message).at(self.mark).below(&self.path));
+    }
+    /// Something that a person should know and that is no fault.
+    pub fn note(&self, message: impl Into<String>) {
+        let fault = Trouble::new(message).at(self.mark).below(&self.path).fault(self.faults.file);
+        self.faults.notes.borrow_mut().push(format!("{}: {}", fault.place, fault.message));
     }
     fn expected(&self, what: &str) {
         match self.content {

@@ -14,7 +14,7 @@ const KINDS: &[(&str, JointKind)] = &[("revolute", JointKind::Revolute), ("prism
 
 pub(super) fn read(screws: &DocumentNode, length: Unit) -> FrameChain {
     let joints = screws.items().into_iter().map(|screw| joint(screw, length)).collect();
-    FrameChain { joints, tip: Isometry3::identity() }
+    FrameChain { joints, tip: Isometry3::identity(), notes: Vec::new() }
 }
 
 fn joint(screw: DocumentNode, length: Unit) -> ChainJoint {

@@ -26,18 +26,21 @@ pub struct UrdfOutline {
     pub base: String,
     /// Whether a joint is prismatic, from the base on.
     pub sliding: Vec<bool>,
+    /// What a person should know of its bodies, a sentence each.
+    pub notes: Vec<String>,
 }
 
 struct Reader<'a> {
     label: &'a str,
     document: &'a Document<'a>,
     faults: Vec<Fault>,
+    notes: Vec<String>,
 }
 
 /// Reads the chain from `base` to `tip`; fails with every fault found, each with its line.
 pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameChain> {
     let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
-    let mut reader = Reader { label: file.label, document: &document, faults: Vec::new() };
+    let mut reader = Reader { label: file.label, document: &document, faults: Vec::new(), notes: Vec::new() };
     let chain = reader.chain(base, tip);
     match chain {
         Some(chain) if reader.faults.is_empty() => Ok(chain),
@@ -59,13 +62,18 @@ pub(super) fn outline(file: RobotFileText, tip: &str) -> Result<UrdfOutline> {
     let way: Vec<String> = way.take(parents.len() + 1).collect();
     let base = way.iter().find(|link| *link == "base_link" && *link != tip).or(way.last()).cloned().unwrap_or_default();
     let chain = read(file, &base, tip)?;
-    Ok(UrdfOutline { base, sliding: chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect() })
+    let sliding = chain.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+    Ok(UrdfOutline { base, sliding, notes: chain.notes })
 }
 
 impl<'a> Reader<'a> {
     fn fault(&mut self, node: Node, message: impl Into<String>) {
-        let line = self.document.text_pos_at(node.range().start).row;
-        self.faults.push(Fault::new(format!("{}:{line}", self.label), message));
+        let place = self.place(node);
+        self.faults.push(Fault::new(place, message));
+    }
+
+    fn place(&self, node: Node) -> String {
+        format!("{}:{}", self.label, self.document.text_pos_at(node.range().start).row)
     }
 
     fn chain(&mut self, base: &str, tip: &str) -> Option<FrameChain> {
@@ -187,7 +195,7 @@ impl<'a> Reader<'a> {
                 body,
             });
         }
-        FrameChain { joints: chain, tip: frame }
+        FrameChain { joints: chain, tip: frame, notes: std::mem::take(&mut self.notes) }
     }
 
     fn kind(&mut self, joint: &UrdfJoint) -> Option<JointKind> {
@@ -274,8 +282,8 @@ impl<'a> Reader<'a> {
         let moments = tensor.map(|node| {
             let moments = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
                 .map(|name| self.numbers(node, name, [if name == "ixx" { f64::NAN } else { 0.0 }], Some(Bound::Inertia))[0]);
-            if let Some(message) = inertia::impossible(&moments) {
-                self.fault(node, format!("link `{link}`: {message}"));
+            if let Some(message) = inertia::impossible_inertia(&moments) {
+                self.notes.push(format!("{}: link `{link}`: {message}{}", self.place(node), inertia::UNUSED));
             }
             inertia::turned(&moments, &place.rotation.to_rotation_matrix())
         });

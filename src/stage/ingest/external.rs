@@ -1,0 +1,95 @@
+//! Axes beside the arm's own (a track, a positioner) that a file records and nobody mapped: where they move, base or workpiece move with them.
+
+use super::arm::RobotJoints;
+use super::layout::{Decimal, FileLayout};
+use super::reading::{self, OpenedFile};
+use super::record::RecordFields;
+use crate::error::{Error, Result};
+use crate::stage::Context;
+
+/// What such columns are called at controllers, without a number and a unit.
+const NAMES: [&str; 11] =
+    ["e", "eax", "ext", "extaxis", "external", "externalaxis", "track", "rail", "linearaxis", "positioner", "gantry"];
+const UNITS: [&str; 4] = ["deg", "mm", "rad", "m"];
+/// An axis that moves by less stands: deg or mm, and rad or m.
+const STILL: [f64; 2] = [0.1, 1e-3];
+/// What RAPID writes for an axis that is not there.
+const NONE: f64 = 9e8;
+
+/// The unit that a name ends in, where it is that of an axis beside the arm's own.
+fn external(name: &str) -> Option<&'static str> {
+    let words: Vec<String> = name
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(|word| word.to_ascii_lowercase())
+        .collect();
+    let unit = words.last().and_then(|last| UNITS.into_iter().find(|unit| unit == last));
+    let words = &words[..words.len() - usize::from(unit.is_some())];
+    let joined = words.concat();
+    let numbered = joined.trim_end_matches(|c: char| c.is_ascii_digit());
+    // RAPID numbers its axes by letters; a bare `e` is no axis.
+    let bare = numbered.strip_prefix("eax").filter(|letter| letter.len() == 1).map_or(numbered, |_| "eax");
+    let is_one = NAMES.contains(&bare) && (bare != "e" || joined.len() == 2);
+    is_one.then(|| unit.unwrap_or("deg"))
+}
+
+/// Fails where a column of such an axis, which is not mapped, changes while the file's joints are read.
+pub(super) fn must_stand(opened: &OpenedFile, layout: &FileLayout, arm: &RobotJoints, context: &Context) -> Result<()> {
+    if !layout.columns.has("q") {
+        return Ok(());
+    }
+    let names = opened.unmapped.iter().filter_map(|(column, name)| Some((*column, name, external(name)?)));
+    let mut all: Vec<(usize, &String, &str, [f64; 2])> =
+        names.map(|(column, name, unit)| (column, name, unit, [f64::INFINITY, f64::NEG_INFINITY])).collect();
+    if all.is_empty() {
+        return Ok(());
+    }
+    let mut rows = reading::records(context.services.open(&layout.file)?, layout)?;
+    let mut record = RecordFields::default();
+    rows.next(&mut record)?;
+    rows.skip(layout.skip_below_header)?;
+    while rows.next(&mut record)? {
+        for (column, .., [least, most]) in &mut all {
+            let text = record.field(*column).and_then(|field| std::str::from_utf8(field).ok()).unwrap_or_default();
+            let comma = rows.is_text() && layout.decimal == Decimal::Comma;
+            let number = if comma { text.replace(',', ".").parse::<f64>() } else { text.parse() };
+            if let Some(number) = number.ok().filter(|number| number.abs() < NONE) {
+                (*least, *most) = (least.min(number), most.max(number));
+            }
+        }
+    }
+    let moves = |(.., unit, [least, most]): &&(usize, &String, &str, [f64; 2])| {
+        most - least > STILL[usize::from(matches!(*unit, "rad" | "m"))]
+    };
+    let Some((_, name, _, [least, most])) = all.iter().find(moves) else { return Ok(()) };
+    let message = format!(
+        "column `{name}` is an axis beside the robot's {} joints, and moves from {least} to {most}: what stands on it moves with it, and the \
+         robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or another \
+         name for the column if it is no axis",
+        arm.joints()
+    );
+    Err(Error::data(&opened.label, message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::external;
+
+    #[test]
+    fn names_of_axes_beside_the_arm_are_known_with_their_units() {
+        for (name, unit) in [
+            ("eax_a", "deg"),
+            ("E1", "deg"),
+            ("e2_mm", "mm"),
+            ("ext_axis_1_m", "m"),
+            ("Track", "deg"),
+            ("rail_mm", "mm"),
+            ("eax1", "deg"),
+        ] {
+            assert_eq!(external(name), Some(unit), "{name}");
+        }
+        for name in ["e", "error_1", "q7", "x_mm", "track_id", "e12", "exact", "mm", ""] {
+            assert_eq!(external(name), None, "{name}");
+        }
+    }
+}
