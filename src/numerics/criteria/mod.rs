@@ -22,6 +22,7 @@ pub mod open_world;
 pub mod screen;
 pub mod search;
 pub mod setup;
+pub mod torque;
 pub mod words;
 
 pub use criterion::CriterionValue;
@@ -40,6 +41,7 @@ pub const TABLES: &[&[CriterionRow]] = &[
     screen::ROWS,
     search::ROWS,
     setup::ROWS,
+    torque::ROWS,
     words::ROWS,
 ];
 
@@ -71,6 +73,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable
         screen::SCALABLE,
         search::SCALABLE,
         setup::SCALABLE,
+        torque::SCALABLE,
         words::SCALABLE,
     ];
     rooms.into_iter().flatten().copied()

@@ -13,7 +13,7 @@ pub(super) struct Viscous;
 const EXPONENTS: [f64; 2] = [0.4, 1.6];
 
 impl TorqueCause for Viscous {
-    about! { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true }
+    about! { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true, brakes: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Viscous, scene, 1, &[&[1.0]])
@@ -30,8 +30,12 @@ impl TorqueCause for Viscous {
         fill(out, |row| power(form, scene.velocity[joint][row]));
     }
 
-    fn friction(&self, form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
+    fn friction(&self, form: &TorqueForm, _column: usize, velocity: f64, _sign: f64) -> Option<f64> {
         Some(power(form, velocity))
+    }
+
+    fn bends(&self, form: &TorqueForm) -> bool {
+        exponent(form).is_some()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
