@@ -331,3 +331,121 @@ impl Resampler {
         self.came(row, time);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::DynamicArm;
+    use super::super::cases::arm;
+    use super::super::used::UsedRecording;
+    use super::*;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    /// Hz of the mean clock.
+    const RATE: f64 = 200.0;
+
+    /// The arm of the other cases, whose masses are not declared.
+    fn bare() -> DynamicArm {
+        DynamicArm { links: None, payload: None, ..arm() }
+    }
+
+    /// A motion of four joints, rad, with its torque, Nm.
+    fn moved(time: f64, joint: usize) -> [f64; 2] {
+        let turn = 2.0 * time + joint as f64;
+        [0.5 * turn.sin(), 20.0 * turn.cos()]
+    }
+
+    /// Rows at some times, stamped at others; a blank of 2 s after row 2000.
+    fn rows(times: &[f64], stamps: &[f64]) -> TorqueRecording {
+        let all = |part: usize| times.iter().flat_map(|time| (0..4).map(move |joint| moved(*time, joint)[part])).collect();
+        let after = |time: &f64| time + if *time > 10.0 { 2.0 } else { 0.0 };
+        let stamps = stamps.iter().map(after).collect();
+        TorqueRecording { torque: all(1), ..TorqueRecording::of_motion(4, stamps, all(0)) }
+    }
+
+    /// Steps of 0.7 to 9.3 ms in disorder.
+    fn uneven() -> Vec<f64> {
+        let mut dice = ChaCha8Rng::seed_from_u64(5);
+        let mut time = 0.0;
+        let step = || {
+            time += (0.7 + 8.6 * dice.random::<f64>()) / 1e3;
+            time
+        };
+        std::iter::repeat_with(step).take(4000).collect()
+    }
+
+    #[test]
+    fn rows_of_uneven_stamps_are_those_of_an_even_clock_and_a_pause_ends_a_stretch() {
+        let times = uneven();
+        let recording = rows(&times, &times);
+        let used = UsedRecording::of(&bare(), &recording, None).unwrap();
+        assert!(used.remarks[0].starts_with("the clock is uneven, steps of 0.7 to ") && used.remarks[0].contains("by their stamps"));
+        assert_eq!(used.clock.stretches.len(), 2, "{:?}", used.remarks);
+        assert!((used.clock.rate / RATE - 1.0).abs() < 0.02, "{}", used.clock.rate);
+        let mut worst = [0.0_f64; 2];
+        for (row, time) in used.recording.time.iter().enumerate() {
+            let time = if *time > 11.0 { time - 2.0 } else { *time };
+            for joint in 0..4 {
+                let [angle, torque] = moved(time, joint);
+                worst[0] = worst[0].max((used.recording.position[4 * row + joint] - angle).abs());
+                worst[1] = worst[1].max((used.recording.torque[4 * row + joint] - torque).abs());
+            }
+            // The recorded row that it comes after.
+            let origin = used.origin[row];
+            assert!(recording.time[origin] <= used.recording.time[row] + 1e-9);
+            assert!(recording.time.get(origin + 1).is_none_or(|next| *next > used.recording.time[row] - 1e-9));
+        }
+        assert!(worst[0] < 1e-5 && worst[1] < 1e-3, "{worst:?}");
+    }
+
+    #[test]
+    fn it_does_not_matter_where_blocks_of_uneven_rows_end() {
+        struct Blocks(TorqueRecording, usize);
+        impl TorqueSource for Blocks {
+            fn joints(&self) -> usize {
+                self.0.joints
+            }
+            fn rows(&self) -> usize {
+                self.0.rows()
+            }
+            fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()> {
+                for start in (0..self.0.rows()).step_by(self.1) {
+                    let mut block = TorqueRecording::like(&self.0);
+                    block.extend(&self.0, start..(start + self.1).min(self.0.rows()));
+                    take(&block)?;
+                }
+                Ok(())
+            }
+        }
+        let times = uneven();
+        let even = |block: usize| {
+            let source = Blocks(rows(&times, &times), block);
+            let even = EvenSource::of(&source).unwrap().expect("uneven");
+            // The same steps whatever the blocks: those at their borders are not counted.
+            let even = EvenSource { period: 0.005, pause: 0.03, ..even };
+            let (mut all, mut from) = (TorqueRecording::like(&source.0), Vec::new());
+            even.each(&mut |block, origin| {
+                all.extend(block, 0..block.rows());
+                from.extend_from_slice(origin);
+                Ok(())
+            })
+            .unwrap();
+            let asked: Vec<usize> = (0..from.len()).step_by(97).collect();
+            assert_eq!(even.recorded(&asked).unwrap(), asked.iter().map(|row| from[*row]).collect::<Vec<usize>>());
+            (all, from)
+        };
+        assert_eq!(even(4000), even(7));
+    }
+
+    #[test]
+    fn stamps_that_err_over_rows_of_an_even_clock_are_not_believed() {
+        let mut dice = ChaCha8Rng::seed_from_u64(9);
+        let times: Vec<f64> = (0..4000).map(|row| f64::from(row) / RATE).collect();
+        let stamps: Vec<f64> = times.iter().map(|time| time + 0.004 * dice.random::<f64>()).collect();
+        let used = UsedRecording::of(&bare(), &rows(&times, &stamps), None).unwrap();
+        assert!(used.remarks[0].contains("the stamps err"), "{}", used.remarks[0]);
+        assert_eq!(used.recording.position, rows(&times, &stamps).position);
+        let first = &used.recording.time[..2000];
+        assert!(first.iter().zip(&times).all(|(made, time)| (made - time).abs() < 0.006));
+    }
+}

@@ -3,6 +3,7 @@
 use super::cause::{FittedNumber, TorqueForm};
 use super::choice::CauseChoice;
 use super::drives::OtherInertials;
+use super::friction_line::number_of_line;
 use super::judge::JudgedSet;
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
@@ -46,7 +47,8 @@ fn finding(
     other: Option<&OtherInertials>,
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
-    let fitted = fitted(problem, uncertain, solution, number);
+    let line = number_of_line(choice, set, number, solution, (uncertain, slopes));
+    let fitted = line.map_or_else(|| fitted(problem, uncertain, solution, number), |line| vec![line]);
     let rest: Vec<usize> = set.iter().copied().filter(|other| *other != number).collect();
     let without = choice.base.with(&rest);
     let loss = sweep.loss(number, solution);

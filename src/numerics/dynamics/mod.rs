@@ -8,6 +8,8 @@ mod bridge;
 #[cfg(test)]
 mod cases;
 #[cfg(test)]
+mod cases_names;
+#[cfg(test)]
 mod cases_shapes;
 mod cause;
 mod changes;
@@ -33,6 +35,7 @@ mod filter;
 mod findings;
 mod friction_curve;
 mod friction_lead;
+mod friction_line;
 mod inertial_names;
 mod inertials;
 mod judge;
@@ -71,7 +74,7 @@ mod used;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use cause::COULOMB;
+pub use cause::{COULOMB, line_of_power};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};
@@ -90,6 +93,10 @@ pub use types::{
 
 use crate::error::{Error, Result};
 use used::UsedRecording;
+
+pub(crate) fn tq(name: &str) -> bool {
+    std::env::var_os(name).is_some()
+}
 
 /// What torques that come late are called.
 const LATENCY: &str = "current_latency";

@@ -3,6 +3,7 @@
 
 use super::cause::{TorqueForm, UNKNOWN};
 use super::choice::CauseChoice;
+use super::friction_line::number_of_line;
 use super::judge::{JudgedSet, modifies};
 use super::polish::polish;
 use super::problem::TorqueProblem;
@@ -95,6 +96,9 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     };
     // The largest of its numbers in standard deviations, with its sign.
     let sure = |place: usize| {
+        if let Some(line) = number_of_line(choice, set, set[place], &solution, (&uncertain, slopes)) {
+            return line.value / line.sigma.max(f64::MIN_POSITIVE);
+        }
         let columns: Vec<usize> = all.of(set[place]).collect();
         let covariance = uncertain.covariance(&columns);
         let of = |(k, column): (usize, &usize)| {

@@ -26,10 +26,7 @@ pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns
 /// Replaces one form of a set.
 pub(super) fn refine_one(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize], place: usize) {
     let form = &problem.all.forms[set[place]];
-    // A power of speed beside a curve of speed without a name is a part of that.
-    let beside = |other: &usize| problem.all.forms[*other].place == form.place && problem.all.forms[*other].is_nameless_curve();
-    let is_part = form.cause.about().brakes && set.iter().any(beside);
-    for span in form.cause.spans(form).into_iter().filter(|_| !is_part) {
+    for span in form.cause.spans(form) {
         for half in HALVES {
             try_grid(problem, weighted, set, place, span, half);
             // What the coarsest grid leaves as it usually is stays so.

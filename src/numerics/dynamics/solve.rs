@@ -23,10 +23,8 @@ use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
 
-/// Forms without a name that are looked for, at most.
+/// Rounds in which forms without a name are looked for, and others in place of those with a number at an end of its search, at most.
 const NAMELESS: usize = 4;
-/// Rounds in which causes whose numbers are at the ends of their search are looked for without these, at most.
-const END_ROUNDS: usize = 3;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
@@ -83,9 +81,12 @@ pub(super) fn solve<'a>(
     refine(&mut problem, &mut weighted, &mut set);
     for _ in 0..NAMELESS {
         set = again(&mut problem, &mut weighted, set, question.seed);
+        let ended = take_out_ends(&mut problem, &mut weighted, &mut set);
         let lasting = lasting_form(&CauseChoice::new(&problem, &weighted, question.seed), &set);
-        let Some(form) = lasting else { break };
-        set.push(form);
+        if lasting.is_none() && !ended {
+            break;
+        }
+        set.extend(lasting);
         tell(told(&problem, &set));
     }
     if touched {
@@ -98,10 +99,16 @@ pub(super) fn solve<'a>(
         learn(&mut problem, &set);
         weighted = problem.weighted();
     }
-    for _ in 0..END_ROUNDS {
-        if !take_out_ends(&mut problem, &mut weighted, &mut set) {
-            break;
+    if super::tq("TQ_END") {
+        for _ in 0..3 {
+            if !take_out_ends(&mut problem, &mut weighted, &mut set) {
+                break;
+            }
+            set = again(&mut problem, &mut weighted, set, question.seed);
+            polish(&mut problem, &mut weighted, &mut set);
         }
+    }
+    if super::tq("TQ_AGAIN") {
         set = again(&mut problem, &mut weighted, set, question.seed);
         polish(&mut problem, &mut weighted, &mut set);
     }

@@ -40,6 +40,7 @@ pub(super) use rotor::ROTOR;
 pub(super) use torque_constant::TORQUE_CONSTANT;
 pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
+pub use viscous::line_of_power;
 
 /// All causes with columns; latency and contacts are looked for before.
 pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [

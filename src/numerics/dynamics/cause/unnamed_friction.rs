@@ -1,4 +1,4 @@
-//! Friction without a name: a smooth curve of speed beside viscous and Coulomb friction.
+//! Friction without a name: a smooth curve of speed, of which viscous and Coulomb friction are the straight line.
 
 use super::unknown::UNKNOWN;
 use super::{COULOMB, FittedNumber, TorqueCause, TorqueForm, VISCOUS, about, fill};

@@ -34,21 +34,25 @@ impl TorqueCause for Viscous {
         Some(power(form, velocity))
     }
 
-    fn bends(&self, form: &TorqueForm) -> bool {
-        exponent(form).is_some()
-    }
-
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {
         let (place, size) = (form.place, fitted[0].value);
         match exponent(form) {
             None => format!("{place} has viscous friction of {size:.3} Nm s/rad"),
             Some(exponent) => {
-                format!(
-                    "{place} has viscous friction of {size:.3} Nm at 1 rad/s, which grows with the power {exponent:.2} of speed"
-                )
+                format!("{place} has viscous friction of {size:.3} Nm s/rad, which grows with the power {exponent:.2} of speed")
             }
         }
     }
+}
+
+/// The straight line nearest to a power of speed over all speeds up to the fastest: at rest, and its slope. Viscous and Coulomb friction that
+/// grow with another power are parts of one sum, and as numbers are those of its line.
+pub fn line_of_power(exponent: f64, fastest: f64) -> [f64; 2] {
+    // Over shares x of the fastest speed: means of x^e and of x x^e.
+    let (mean, moment) = (1.0 / (exponent + 1.0), 1.0 / (exponent + 2.0));
+    let slope = 12.0 * (moment - 0.5 * mean);
+    let scale = fastest.powf(exponent);
+    [scale * (mean - 0.5 * slope), scale * slope / fastest.max(f64::MIN_POSITIVE)]
 }
 
 /// Where it is not 1.
