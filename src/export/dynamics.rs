@@ -39,9 +39,10 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             let mut own = rows(effect).filter(|row| row.place == place && row.form.is_some() && alone(effect));
             own.next().map_or(Value::Null, number)
         };
-        let curve = curves.iter().find(|curve| curve.joint == index).map(|curve| {
-            json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma })
-        });
+        let curve = curves
+            .iter()
+            .find(|curve| curve.joint == index)
+            .map(|curve| json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma }));
         let seen = &model.range[index];
         let mut viscous = of(DAMPING);
         if let (Some(own), Some(exponent)) = (viscous.as_object_mut(), exponent(torques, index)) {

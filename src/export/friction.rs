@@ -30,7 +30,8 @@ pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usiz
     let (value, seen) = (own.coefficients.first().copied()?, torques.model.range.get(joint)?);
     let held = as_one_number(own, value, seen).map_or(value, |(held, _)| held);
     // Dry friction beside a power of speed is that of the line of both.
-    let power = torques.model.terms.iter().find(|term| term.effect == DAMPING && term.place == own.place).filter(|_| effect == FRICTION);
+    let power =
+        torques.model.terms.iter().find(|term| term.effect == DAMPING && term.place == own.place).filter(|_| effect == FRICTION);
     let beside = power.and_then(|power| Some(line_of_power(bent(power)?, seen.speed)[0] * power.coefficients.first()?));
     Some(held + beside.unwrap_or(0.0))
 }

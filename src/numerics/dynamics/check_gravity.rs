@@ -103,7 +103,9 @@ fn remedy(from_current: bool, times: f64) -> &'static str {
             ". Remedy: if the columns are motor currents (A), map them as `current` and state `ratio` and `kt` (Nm/A) of each joint in the \
              robot file; if they are torques of the motors, set `torque_side: motor`"
         }
-        (true, true) => ". Remedy: if the columns are joint torques (Nm), map them as `torque`; else correct `kt` (Nm/A) and `ratio`",
+        (true, true) => {
+            ". Remedy: if the columns are joint torques (Nm), map them as `torque`; else correct `kt` (Nm/A) and `ratio`"
+        }
         _ => ". Remedy: correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file",
     }
 }

@@ -244,7 +244,11 @@ impl Resampler {
         while self.done + 2 < rows || (ends && self.done < rows) {
             let row = self.done;
             if row + self.first == 0 || self.is_torn(row) {
-                self.begun = self.held.time[row].max(if self.by_stamps { f64::NEG_INFINITY } else { self.last + self.period + self.pause });
+                self.begun = self.held.time[row].max(if self.by_stamps {
+                    f64::NEG_INFINITY
+                } else {
+                    self.last + self.period + self.pause
+                });
                 self.made = 0;
                 self.push(row, self.begun);
             }
@@ -322,10 +326,9 @@ impl Resampler {
         };
         rewrite(&mut self.out.position, &self.held.position, n);
         rewrite(&mut self.out.torque, &self.held.torque, n);
-        for (out, held, width) in [
-            (&mut self.out.velocity, &self.held.velocity, n),
-            (&mut self.out.temperature, &self.held.temperature, 1),
-        ] {
+        for (out, held, width) in
+            [(&mut self.out.velocity, &self.held.velocity, n), (&mut self.out.temperature, &self.held.temperature, 1)]
+        {
             out.iter_mut().zip(held).for_each(|(out, held)| rewrite(out, held, width));
         }
         self.came(row, time);
@@ -379,7 +382,9 @@ mod tests {
         let times = uneven();
         let recording = rows(&times, &times);
         let used = UsedRecording::of(&bare(), &recording, None).unwrap();
-        assert!(used.remarks[0].starts_with("the clock is uneven, steps of 0.7 to ") && used.remarks[0].contains("by their stamps"));
+        assert!(
+            used.remarks[0].starts_with("the clock is uneven, steps of 0.7 to ") && used.remarks[0].contains("by their stamps")
+        );
         assert_eq!(used.clock.stretches.len(), 2, "{:?}", used.remarks);
         assert!((used.clock.rate / RATE - 1.0).abs() < 0.02, "{}", used.clock.rate);
         let mut worst = [0.0_f64; 2];

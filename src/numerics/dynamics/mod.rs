@@ -94,10 +94,6 @@ pub use types::{
 use crate::error::{Error, Result};
 use used::UsedRecording;
 
-pub(crate) fn tq(name: &str) -> bool {
-    std::env::var_os(name).is_some()
-}
-
 /// What torques that come late are called.
 const LATENCY: &str = "current_latency";
 /// What a push on the arm is called.

@@ -25,6 +25,8 @@ use super::weighted::WeightedColumns;
 
 /// Rounds in which forms without a name are looked for, and others in place of those with a number at an end of its search, at most.
 const NAMELESS: usize = 4;
+/// Rounds in which others are looked for in place of forms that the polish brought to an end of their search, at most.
+const END_ROUNDS: usize = 3;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
@@ -99,16 +101,10 @@ pub(super) fn solve<'a>(
         learn(&mut problem, &set);
         weighted = problem.weighted();
     }
-    if super::tq("TQ_END") {
-        for _ in 0..3 {
-            if !take_out_ends(&mut problem, &mut weighted, &mut set) {
-                break;
-            }
-            set = again(&mut problem, &mut weighted, set, question.seed);
-            polish(&mut problem, &mut weighted, &mut set);
+    for _ in 0..END_ROUNDS {
+        if !take_out_ends(&mut problem, &mut weighted, &mut set) {
+            break;
         }
-    }
-    if super::tq("TQ_AGAIN") {
         set = again(&mut problem, &mut weighted, set, question.seed);
         polish(&mut problem, &mut weighted, &mut set);
     }
