@@ -95,19 +95,20 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
 }
 
 /// What is likely wrong where torques are so many times those of the declared masses, and what to do.
-fn remedy(from_current: bool, times: f64) -> &'static str {
+fn remedy(from_current: bool, times: f64) -> String {
     const THOUSAND: f64 = 100.0;
-    match (from_current, times > 1.0) {
-        _ if !(1.0 / THOUSAND..=THOUSAND).contains(&times) => " (by 1,000?)",
+    let thousand = if (1.0 / THOUSAND..=THOUSAND).contains(&times) { "" } else { " (by 1,000?)" };
+    let remedy = match (from_current, times > 1.0) {
         (false, false) => {
-            ". Remedy: if the columns are motor currents (A), map them as `current` and state `ratio` and `kt` (Nm/A) of each joint in the \
-             robot file; if they are torques of the motors, set `torque_side: motor`"
+            "if the columns are motor currents (A), map them as `current` and state `ratio` and `kt` (Nm/A) of each joint in the robot file; \
+             if they are torques of the motors, set `torque_side: motor`"
         }
         (true, true) => {
-            ". Remedy: if the columns are joint torques (Nm), map them as `torque`; else correct `kt` (Nm/A) and `ratio`"
+            "if the columns are joint torques (Nm), map them as `torque`; else correct their unit, `kt` (Nm/A) or `ratio`"
         }
-        _ => ". Remedy: correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file",
-    }
+        _ => "correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file",
+    };
+    format!("{thousand}. Remedy: {remedy}")
 }
 
 /// Another reading of the recorded angles.

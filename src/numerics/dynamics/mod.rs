@@ -56,6 +56,7 @@ mod reduce;
 mod refine;
 mod regressor;
 mod rejudge;
+mod resample;
 mod rich;
 mod scene;
 mod search;
