@@ -29,7 +29,7 @@ ENDS = {
     "backlash_spikes": {"time": (0.01, 0.3)}, "warmup_friction": {"time": (1.0, None)}, "current_offset": {"time": (2.0, None)},
     "wrist_coupling": {"ratio": (0.05, 2.0)}, "current_latency": {"latency": (None, 48.0)}, "torque_ripple": {"order": (None, 9), "motor_order": (None, 3)},
 }
-LONGEST = 0.45
+LONGEST = 0.9
 NEAR = 0.02
 
 
