@@ -60,7 +60,9 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
         };
         let heavy = || weighty.iter().filter(weighs);
         // Friction and acceleration are in the rms of a torque, not in its share along gravity.
-        let of_gravity = heavy().all(|joint| wrong(share(joint), *UNIT)) && heavy().any(|joint| *joint == heaviest);
+        // Beyond on one side alone: joints that are exchanged are on both.
+        let beyond = |more: bool| heavy().all(|joint| wrong(share(joint), *UNIT) && (share(joint).abs() > 1.0) == more);
+        let of_gravity = heavy().any(|joint| *joint == heaviest) && (beyond(true) || beyond(false));
         if of_gravity || wrong(own, UNIT_RATIO) {
             let times = if of_gravity { share(&heaviest).abs() } else { own };
             faults.push(Fault::new(
