@@ -1,6 +1,6 @@
 //! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
-use super::friction::{ARMATURE, DAMPING, FRICTION, exponent};
+use super::friction::{ARMATURE, DAMPING, FRICTION, exponent, stands_alone};
 use super::{CarriedTorques, Export, Format};
 use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS};
 use crate::error::{Error, Result};
@@ -21,18 +21,28 @@ fn text(export: &Export) -> Result<String> {
         return Err(Error::spec("--format dynamics", message));
     };
     let document = document(export, torques);
-    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    serde_json::to_string_pretty(&document?).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
 }
 
 /// The model of torques as one document.
-pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
+pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<Value> {
     let model = &torques.model;
+    let curves = model.friction_curves()?;
     let rows = |effect: &'static str| torques.parameters.0.iter().filter(move |row| row.effect == effect);
     let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
-        let of =
-            |effect: &'static str| rows(effect).find(|row| row.place == place && row.form.is_some()).map_or(Value::Null, number);
+        let alone = |effect: &str| {
+            model.terms.iter().any(|term| term.effect == effect && term.place.to_string() == place && stands_alone(torques, term))
+        };
+        let of = |effect: &'static str| {
+            let mut own = rows(effect).filter(|row| row.place == place && row.form.is_some() && alone(effect));
+            own.next().map_or(Value::Null, number)
+        };
+        let curve = curves
+            .iter()
+            .find(|curve| curve.joint == index)
+            .map(|curve| json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma }));
         let seen = &model.range[index];
         let mut viscous = of(DAMPING);
         if let (Some(own), Some(exponent)) = (viscous.as_object_mut(), exponent(torques, index)) {
@@ -40,7 +50,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
             own.insert("exponent".into(), json!(exponent));
         }
         json!({
-            "name": joint.name, "viscous": viscous, "coulomb": of(FRICTION),
+            "name": joint.name, "viscous": viscous, "coulomb": of(FRICTION), "friction": curve,
             "armature": of(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
             "sign_width_rad_s": seen.sign_width,
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
@@ -64,14 +74,15 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
             "body": body, "numbers": numbers,
         })
     });
-    json!({
+    Ok(json!({
         "calib_torques": 1,
         "name": export.corrected.name,
         "origin": torques.origin,
         "conventions": format!(
             "SI; joints and links from 1, axes of the base at the zero pose; numbers of a link are {}, moments from its joint's point and \
              inertias about it, those of links that are not whole stand for others too; the last link carries the payload; torques are those \
-             that the drives or sensors of the recording state",
+             that the drives or sensors of the recording state; friction is the sum of all laws of speed at a joint, viscous and coulomb its parts \
+             where they stand alone",
             INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
         ),
         "sign_width_rad_s": model.sign_width,
@@ -81,7 +92,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Value {
         "causes": causes(torques),
         "of_the_recording": torques.of_the_recording,
         "remarks": torques.warnings,
-    })
+    }))
 }
 
 /// Every cause with all of its numbers.
@@ -96,7 +107,7 @@ fn causes(torques: &IdentifiedTorques) -> Vec<Value> {
         let numbers: Map<String, Value> =
             own.map(|row| (row.quantity.clone(), json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma }))).collect();
         json!({
-            "effect": term.effect, "where": term.place.to_string(), "numbers": numbers, "with": term.with, "shape": term.shape,
+            "effect": term.effect, "where": term.place.to_string(), "alone": stands_alone(torques, term), "numbers": numbers, "with": term.with, "shape": term.shape,
             "rms_nm": term.rms,
         })
     };

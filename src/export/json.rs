@@ -47,7 +47,7 @@ fn text(export: &Export) -> Result<String> {
         "learned_correction": identified.correction.is_some(),
     });
     if let Some(torques) = &identified.torques {
-        document["torques"] = super::dynamics::document(export, torques);
+        document["torques"] = super::dynamics::document(export, torques)?;
     }
     serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
 }

@@ -23,6 +23,7 @@ pub mod open_world;
 pub mod screen;
 pub mod search;
 pub mod setup;
+pub mod torque;
 pub mod words;
 
 pub use criterion::CriterionValue;
@@ -42,6 +43,7 @@ pub const TABLES: &[&[CriterionRow]] = &[
     screen::ROWS,
     search::ROWS,
     setup::ROWS,
+    torque::ROWS,
     words::ROWS,
 ];
 
@@ -74,6 +76,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable
         screen::SCALABLE,
         search::SCALABLE,
         setup::SCALABLE,
+        torque::SCALABLE,
         words::SCALABLE,
     ];
     rooms.into_iter().flatten().copied()

@@ -265,6 +265,14 @@ fn a_recording_that_cannot_be_used_is_refused_with_its_reason() {
     let least = good.torque.iter().skip(1).step_by(4).copied().fold(0.0, f64::min);
     let answers = [
         (said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 1e3)), "by 1,000?"),
+        (said(&|r| r.torque.iter_mut().for_each(|torque| *torque *= 0.08)), "map them as `current`"),
+        (
+            said(&|r| {
+                r.torque.iter_mut().for_each(|torque| *torque *= 12.0);
+                r.from_current = true;
+            }),
+            "map them as `torque`",
+        ),
         (said(&|r| r.position.iter_mut().for_each(|angle| *angle = angle.to_degrees())), "degrees?"),
         (said(&|r| r.torque.chunks_exact_mut(4).for_each(|row| row.swap(1, 2))), "joint 2 and joint 3 look exchanged"),
         (said(&|r| r.time[700] = r.time[600]), "row 701: the clock goes"),

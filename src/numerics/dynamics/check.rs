@@ -5,7 +5,7 @@ use super::check_gravity::gravity_faults;
 use super::clock::RecordingClock;
 use super::extremes::TorqueExtremes;
 use super::recording::TorqueRecording;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::statistics::nearest;
 
 /// Rows, at least.
@@ -205,7 +205,18 @@ pub(super) fn remarks(recording: &TorqueRecording, origin: &[usize], clock: &Rec
         let lasted = recording.time[stretch.start] - recording.time[stretch.start - 1];
         torn_at(origin[stretch.start], lasted, usual)
     };
-    clock.stretches[1..].iter().map(torn).chain(of_clock_and_sets(recording, usual)).collect()
+    few(clock.stretches[1..].iter().map(torn)).into_iter().chain(of_sets(recording)).collect()
+}
+
+/// The first sentences of many that are alike, and how many more there are.
+pub(super) fn few(all: impl Iterator<Item = String>) -> Vec<String> {
+    /// That are told one by one.
+    const TOLD: usize = 3;
+    let mut all: Vec<String> = all.collect();
+    let more = all.len().saturating_sub(TOLD);
+    all.truncate(TOLD);
+    all.extend((more > 0).then(|| format!("the same at {} more", counted(more, "row"))));
+    all
 }
 
 /// A sentence on a row before which clock or joints jump: `lasted` s after the row before, where `usual` s are usual.
@@ -214,17 +225,7 @@ pub(super) fn torn_at(row: usize, lasted: f64, usual: f64) -> String {
     format!("row {}: {what}; nothing is filtered across it", row + 1)
 }
 
-/// Sentences on uneven steps of the clock, which are usually `usual` s, and on rows that judge.
-pub(super) fn of_clock_and_sets(recording: &TorqueRecording, usual: f64) -> Vec<String> {
-    let mut remarks = Vec::new();
-    let uneven = recording.time.windows(2).filter(|pair| (pair[1] - pair[0] - usual).abs() > 0.2 * usual).count();
-    if uneven > recording.rows() / 20 {
-        remarks.push(format!(
-            "{uneven} steps of the clock are more than 20 % off {usual:.4} s; they are filtered as if they were even"
-        ));
-    }
-    if !recording.held_out.contains(&true) {
-        remarks.push("no rows are held out: errors are of the rows that were fitted".into());
-    }
-    remarks
+/// A sentence where no rows judge.
+pub(super) fn of_sets(recording: &TorqueRecording) -> Option<String> {
+    (!recording.held_out.contains(&true)).then(|| "no rows are held out: errors are of the rows that were fitted".into())
 }

@@ -5,6 +5,7 @@ use super::arm::DynamicArm;
 use super::inertials::DeclaredInertials;
 use super::newton_euler::{InverseDynamics, MotionRow};
 use super::recording::TorqueRecording;
+use crate::criteria::torque::{UNIT, WEIGHS, WEIGHTY};
 use crate::error::Fault;
 use crate::statistics::nearest;
 
@@ -51,10 +52,27 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
     let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
         let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
-        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&own) {
+        let share = |joint: &usize| products[*joint][*joint] / gravity_square[*joint];
+        let wrong = |times: f64, most: f64| !(1.0 / most..=most).contains(&times.abs());
+        let weighs = |joint: &&usize| {
+            let explained = products[**joint][**joint].powi(2) / (measured_square[**joint] * gravity_square[**joint]);
+            gravity_square[**joint] > WEIGHTY.powi(2) * gravity_square[heaviest] && explained > *WEIGHS
+        };
+        let heavy = || weighty.iter().filter(weighs);
+        // Friction and acceleration are in the rms of a torque, not in its share along gravity.
+        // Beyond on one side alone: joints that are exchanged are on both.
+        let beyond = |more: bool| heavy().all(|joint| wrong(share(joint), *UNIT) && (share(joint).abs() > 1.0) == more);
+        let of_gravity = heavy().any(|joint| *joint == heaviest) && (beyond(true) || beyond(false));
+        if of_gravity || wrong(own, UNIT_RATIO) {
+            let times = if of_gravity { share(&heaviest).abs() } else { own };
             faults.push(Fault::new(
                 "torque",
-                format!("torques are {own:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or torque constant is wrong (by 1,000?)", heaviest + 1),
+                format!(
+                    "torques are {times:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or \
+                     torque constant is wrong{}",
+                    heaviest + 1,
+                    remedy(recording.from_current, times)
+                ),
             ));
             return faults;
         }
@@ -76,6 +94,23 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording, theta: &[f64]) -
         }
     }
     faults
+}
+
+/// What is likely wrong where torques are so many times those of the declared masses, and what to do.
+fn remedy(from_current: bool, times: f64) -> String {
+    const THOUSAND: f64 = 100.0;
+    let thousand = if (1.0 / THOUSAND..=THOUSAND).contains(&times) { "" } else { " (by 1,000?)" };
+    let remedy = match (from_current, times > 1.0) {
+        (false, false) => {
+            "if the columns are motor currents (A), map them as `current` and state `ratio` and `kt` (Nm/A) of each joint in the robot file; \
+             if they are torques of the motors, set `torque_side: motor`"
+        }
+        (true, true) => {
+            "if the columns are joint torques (Nm), map them as `torque`; else correct their unit, `kt` (Nm/A) or `ratio`"
+        }
+        _ => "correct the unit of the columns, or masses, `kt` (Nm/A) and `ratio` of the robot file",
+    };
+    format!("{thousand}. Remedy: {remedy}")
 }
 
 /// Another reading of the recorded angles.

@@ -42,7 +42,8 @@ impl<'a> CauseChoice<'a> {
     pub fn worth(&self, sweep: &SweptColumns, number: usize) -> f64 {
         let gain = sweep.gain(number);
         let form = self.form(number);
-        if form.cause.about().positive && !sweep.rises(number) {
+        let about = form.cause.about();
+        if (about.positive || (about.brakes && !self.is_part_of_curve(form, |other| sweep.has(other)))) && !sweep.rises(number) {
             return f64::NEG_INFINITY;
         }
         let worth = gain.square - self.penalty(number, gain.rank.max(1));
@@ -64,7 +65,18 @@ impl<'a> CauseChoice<'a> {
         if !form.cause.is_itself(form, &self.problem.scene) || !form.cause.is_possible(form, &whole) {
             return true;
         }
-        self.form(number).cause.about().positive && values().any(|value| value <= -NEARLY_ZERO * largest)
+        let is_in = |other: usize| solution.iter().any(|(column, _)| self.problem.all.of(other).contains(column));
+        let about = form.cause.about();
+        let only_positive = about.positive || (about.brakes && !self.is_part_of_curve(form, is_in));
+        only_positive && values().any(|value| value <= -NEARLY_ZERO * largest)
+    }
+
+    /// Whether a curve of speed without a name is at the place of a form, by which forms are in.
+    pub fn is_part_of_curve(&self, form: &TorqueForm, is_in: impl Fn(usize) -> bool) -> bool {
+        (0..self.problem.all.forms.len()).any(|other| {
+            let curve = self.form(other);
+            curve.place == form.place && curve.is_nameless_curve() && is_in(other)
+        })
     }
 
     /// Criterion of a set: whitened squared residual, tolerances stretched, and penalties.
@@ -87,7 +99,9 @@ impl<'a> CauseChoice<'a> {
             *other == number
                 || (form.is_called_as(other_form) && (!form.cause.about().may_repeat || form.with == other_form.with))
         };
-        !set.iter().any(taken) && self.has_what_it_modifies(number, set)
+        let is_barred = || self.problem.barred.iter().any(|(cause, place)| *cause == form.cause.name() && *place == form.place);
+        let is_same_curve = |other: &usize| form.is_one_curve_with(self.form(*other));
+        !set.iter().any(taken) && self.has_what_it_modifies(number, set) && !set.iter().any(is_same_curve) && !is_barred()
     }
 
     /// Whether the frictions that a form modifies are in a set.

@@ -6,6 +6,7 @@ use super::newton_euler::INERTIAL_NUMBERS;
 use super::reduce::Reduction;
 use super::regressor::{ReducedRegressor, TorqueColumn};
 use super::scene::DynamicScene;
+use crate::criteria::torque::FRICTION;
 
 /// Base columns, then those of all forms, form after form.
 pub(super) struct TorqueColumns {
@@ -14,13 +15,15 @@ pub(super) struct TorqueColumns {
     pub base: usize,
     /// Link and change of its numbers per coefficient of the base.
     pub base_changes: Vec<(usize, [f64; INERTIAL_NUMBERS])>,
-    /// 1 / variance beforehand of each coefficient of the base.
+    /// 1 / variance beforehand of each coefficient.
     pub prior: Vec<f64>,
     pub forms: Vec<TorqueForm>,
     /// Forms that causes list; later ones are trials of a refinement.
     pub listed: usize,
     /// First column of each form.
     first: Vec<usize>,
+    /// Nm, half the range of each joint's torque.
+    torque: Vec<f64>,
 }
 
 /// 1 / variance, over the squared size of its column, of a coefficient of which nothing is known.
@@ -37,13 +40,20 @@ impl TorqueColumns {
             forms: Vec::new(),
             listed: 0,
             first: Vec::new(),
+            torque: Vec::new(),
         }
     }
 
-    /// The base, and all forms of all causes but `without`.
-    pub fn new(scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor, without: &[String]) -> Self {
+    /// The base, and all forms of all causes but `without`; `torque` is half the range of each joint's torque, Nm.
+    pub fn new(
+        scene: &DynamicScene,
+        reduction: &Reduction,
+        regressor: &ReducedRegressor,
+        without: &[String],
+        torque: Vec<f64>,
+    ) -> Self {
         let (base_changes, columns, prior) = base_columns(scene, regressor);
-        let mut all = Self { base: columns.len(), base_changes, columns, prior, forms: Vec::new(), listed: 0, first: Vec::new() };
+        let mut all = Self { base: columns.len(), base_changes, columns, prior, torque, ..Self::empty() };
         let causes = TORQUE_CAUSES.iter().filter(|cause| without.iter().all(|name| name != cause.name()));
         for form in causes.flat_map(|cause| cause.forms(scene)) {
             all.push(form, scene, reduction, regressor);
@@ -65,9 +75,21 @@ impl TorqueColumns {
             None => columns_of(&form, scene, reduction, regressor),
         };
         self.first.push(self.columns.len());
+        self.prior.resize(self.columns.len(), 0.0);
+        let prior: Vec<f64> = columns.iter().map(|column| self.friction_prior(&form, column)).collect();
+        self.prior.extend(prior);
         self.columns.extend(columns);
         self.forms.push(form);
         self.forms.len() - 1
+    }
+
+    /// 1 / variance beforehand of a coefficient: a law of friction alone is hardly more than the whole torque of its joint, so that two of them
+    /// do not cancel each other.
+    fn friction_prior(&self, form: &TorqueForm, column: &TorqueColumn) -> f64 {
+        let about = form.cause.about();
+        let Some(most) = self.torque.get(form.joint()).filter(|_| about.of_sign || about.brakes) else { return 0.0 };
+        let largest = column.courses.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        (largest / (*FRICTION * most).max(f64::MIN_POSITIVE)).powi(2)
     }
 
     /// Columns of forms that are made of the rigid torque, anew.
@@ -96,6 +118,7 @@ impl TorqueColumns {
     /// Takes a column of no form; its number.
     pub fn push_bare(&mut self, column: TorqueColumn) -> usize {
         self.columns.push(column);
+        self.prior.resize(self.columns.len(), 0.0);
         self.columns.len() - 1
     }
 

@@ -85,7 +85,7 @@ impl JointRange {
     fn beyond(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, row: usize) -> f64 {
         let above = |value: f64, most: f64| if most > 0.0 { (value.abs() / most - 1.0).max(0.0) } else { 0.0 };
         let load = if form.cause.about().of_rigid { above(scene.rigid[joint][row], self.load) } else { 0.0 };
-        let is_friction = !form.cause.about().modifies.is_empty() || form.cause.friction(form, 1.0, 1.0).is_some();
+        let is_friction = !form.cause.about().modifies.is_empty() || form.cause.friction(form, 0, 1.0, 1.0).is_some();
         if is_friction {
             return load.max(above(scene.velocity[joint][row], self.speed));
         }

@@ -2,6 +2,9 @@
 
 use super::cause::{FittedNumber, TorqueForm};
 use super::choice::CauseChoice;
+use super::drives::OtherInertials;
+use super::friction_line::number_of_line;
+use super::judge::JudgedSet;
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
@@ -20,15 +23,16 @@ const FREEDOM: f64 = 1e4;
 /// Findings of a judged set but for what is silent, strongest first.
 pub(super) fn findings(
     choice: &CauseChoice,
-    (set, silent): (&[usize], &[usize]),
+    JudgedSet { set, silent, .. }: &JudgedSet,
     held_out: &[usize],
     uncertain: (&SweptColumns, &ShapeSlopes),
+    other: Option<&OtherInertials>,
 ) -> Vec<TorqueFinding> {
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
     let named = set.iter().filter(|number| silent.iter().all(|one| !choice.form(*one).is_called_as(choice.form(**number))));
     let mut found: Vec<TorqueFinding> =
-        named.map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain)).collect();
+        named.map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain, other)).collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     found
 }
@@ -40,9 +44,11 @@ fn finding(
     number: usize,
     held_out: &[usize],
     (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
+    other: Option<&OtherInertials>,
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
-    let fitted = fitted(problem, uncertain, solution, number);
+    let line = number_of_line(choice, set, number, solution, (uncertain, slopes));
+    let fitted = line.map_or_else(|| fitted(problem, uncertain, solution, number), |line| vec![line]);
     let rest: Vec<usize> = set.iter().copied().filter(|other| *other != number).collect();
     let without = choice.base.with(&rest);
     let loss = sweep.loss(number, solution);
@@ -74,8 +80,24 @@ fn finding(
         rivals: rivals(choice, &rest, &without, number, loss.square),
         probabilities: Probabilities::default(),
     };
+    if let Some(other) = other.filter(|_| form.cause.about().inertial) {
+        in_place(choice, other, &mut finding);
+    }
     weigh(&mut finding, loss.square - choice.penalty(number, loss.rank.max(1)));
     finding
+}
+
+/// Adds wrong masses or drives that together stand in place of those of the set: they share what one of them would have.
+fn in_place(choice: &CauseChoice, other: &OtherInertials, finding: &mut TorqueFinding) {
+    let shared = other.worse + 2.0 * TEMPERATURE * (other.forms.len() as f64).ln();
+    for form in other.forms.iter().map(|number| choice.form(*number)).filter(|_| shared <= FARTHEST) {
+        let (effect, place) = (form.cause.name(), form.place);
+        let is_own = effect == finding.effect && place == finding.place;
+        if !is_own && finding.rivals.iter().all(|rival| (rival.effect, rival.place) != (effect, place)) {
+            finding.rivals.push(RivalCause { effect, place, delta_bic: shared, probability: 0.0 });
+        }
+    }
+    finding.rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
 }
 
 /// Parameters with the standard deviations of shape numbers.

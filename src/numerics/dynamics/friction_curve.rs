@@ -1,69 +1,76 @@
-//! Friction of a joint over its velocity, with its band.
+//! Friction of a joint over its velocity, with its band: the sum of all laws of speed, which single ones may stand for in part alone.
 
 use super::cause::TorqueForm;
-use super::problem::TorqueProblem;
-use super::shape_slopes::{ShapeNumber, ShapeSlopes, slope};
-use super::sweep::SweptColumns;
+use super::model::TorqueModel;
+use super::shape_slopes::slope;
 use super::types::FrictionCurve;
 use crate::effect::Place;
+use crate::error::Result;
 
 /// Velocities on either side of zero.
 const POINTS: usize = 30;
 
-/// The curve of every joint whose set has friction.
-pub(super) fn friction_curves(
-    problem: &TorqueProblem,
-    set: &[usize],
-    sweep: &SweptColumns,
-    uncertain: (&SweptColumns, &ShapeSlopes),
-) -> Vec<FrictionCurve> {
-    (0..problem.joints()).filter_map(|joint| curve(problem, set, sweep, uncertain, joint)).collect()
+/// A law of friction of a joint: its form, coefficients, and where these and its shape numbers stand in the covariance.
+struct FrictionLaw<'a> {
+    form: TorqueForm,
+    coefficients: &'a [f64],
+    first: usize,
+    shapes: usize,
 }
 
-fn curve(
-    problem: &TorqueProblem,
-    set: &[usize],
-    sweep: &SweptColumns,
-    (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
-    joint: usize,
-) -> Option<FrictionCurve> {
-    let scene = &problem.scene;
-    let forms = set.iter().map(|number| (*number, &problem.all.forms[*number]));
-    let own: Vec<_> =
-        forms.filter(|(_, form)| form.place == Place::Joint(joint) && form.cause.friction(form, 0.0, 0.0).is_some()).collect();
-    let columns: Vec<usize> = own.iter().flat_map(|(number, _)| problem.all.of(*number)).collect();
-    if columns.is_empty() {
-        return None;
+impl FrictionLaw<'_> {
+    /// Nm at a velocity whose sign turns over a width.
+    fn torque(&self, form: &TorqueForm, velocity: f64, width: f64) -> f64 {
+        let sign = (velocity / width).tanh();
+        let of = |(column, value): (usize, &f64)| form.cause.friction(form, column, velocity, sign).unwrap_or(0.0) * value;
+        self.coefficients.iter().enumerate().map(of).sum()
     }
-    let solution = sweep.solution();
-    let value = |column: &usize| solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value);
-    let values: Vec<f64> = columns.iter().map(value).collect();
-    let fastest = scene.velocity[joint].iter().map(|velocity| velocity.abs()).fold(0.0, f64::max);
-    let points = (-(POINTS as i32)..=POINTS as i32).map(|point| fastest * f64::from(point) / POINTS as f64);
-    let mut curve = FrictionCurve { joint, velocity: points.collect(), torque: Vec::new(), sigma: Vec::new() };
-    let all: Vec<usize> = columns.iter().copied().chain(slopes.0.iter().map(|(_, column)| *column)).collect();
-    let covariance = uncertain.covariance(&all);
-    let share = scene.width_at(joint) / scene.sign_width;
-    let law =
-        |form: &TorqueForm, velocity: f64, width: f64| form.cause.friction(form, velocity, (velocity / (share * width)).tanh());
-    for velocity in &curve.velocity {
-        let of = |width: f64| own.iter().filter_map(move |(_, form)| law(form, *velocity, width));
-        let laws: Vec<f64> = of(scene.sign_width).collect();
-        let torque = |laws: &mut dyn Iterator<Item = f64>| laws.zip(&values).map(|(law, value)| law * value).sum::<f64>();
-        let by_shape = |(number, _): &(ShapeNumber, usize)| match number {
-            ShapeNumber::SignWidth => slope(scene.sign_width, |width| torque(&mut of(width))),
-            ShapeNumber::Of(form, index) => {
-                let Some(place) = own.iter().position(|(number, _)| number == form) else { return 0.0 };
-                let form = own[place].1;
-                let moved = |size: f64| law(&form.with_shape(*index, size), *velocity, scene.sign_width).unwrap_or(0.0);
-                values[place] * slope(form.shape[*index], moved)
+}
+
+impl TorqueModel {
+    /// The curve of every joint that has friction, over the speeds of the recording; standard deviations are 0 where the model carries no
+    /// covariance. Fails where no cause has a term's name.
+    pub fn friction_curves(&self) -> Result<Vec<FrictionCurve>> {
+        let known = self.identified.iter().filter(|known| **known).count();
+        let mut shapes = known + self.terms.iter().map(|term| term.coefficients.len()).sum::<usize>();
+        let mut first = known;
+        let mut laws: Vec<Vec<FrictionLaw>> = (0..self.joints()).map(|_| Vec::new()).collect();
+        for term in &self.terms {
+            let form = term.form()?;
+            let (own, numbers) = (first, shapes);
+            first += term.coefficients.len();
+            shapes += form.shape_numbers().len();
+            if let (Place::Joint(joint), Some(_)) = (form.place, form.cause.friction(&form, 0, 0.0, 0.0)) {
+                laws[joint].push(FrictionLaw { form, coefficients: &term.coefficients, first: own, shapes: numbers });
             }
-        };
-        let along: Vec<f64> = laws.iter().copied().chain(slopes.0.iter().map(by_shape)).collect();
-        let count = along.len();
-        let variance: f64 = (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
-        curve.torque.push(torque(&mut laws.iter().copied()));
-        curve.sigma.push(variance.max(0.0).sqrt());
+        }
+        let curves = laws.iter().enumerate().filter(|(_, laws)| !laws.is_empty());
+        Ok(curves.map(|(joint, laws)| self.friction_curve(joint, laws, shapes + 1)).collect())
     }
-    Some(curve)
+
+    fn friction_curve(&self, joint: usize, laws: &[FrictionLaw], numbers: usize) -> FrictionCurve {
+        let (range, whole) = (&self.range[joint], self.covariance.len() == numbers * numbers);
+        let share = range.sign_width / self.sign_width;
+        let points = (-(POINTS as i32)..=POINTS as i32).map(|point| range.speed * f64::from(point) / POINTS as f64);
+        let mut curve = FrictionCurve { joint, velocity: points.collect(), torque: Vec::new(), sigma: Vec::new() };
+        for velocity in &curve.velocity {
+            let sum = |width: f64| laws.iter().map(|law| law.torque(&law.form, *velocity, width)).sum::<f64>();
+            let mut along = vec![(numbers - 1, slope(self.sign_width, |width| sum(share * width)))];
+            for law in laws {
+                let sign = (velocity / range.sign_width).tanh();
+                let of = |column: usize| law.form.cause.friction(&law.form, column, *velocity, sign).unwrap_or(0.0);
+                along.extend((0..law.coefficients.len()).map(|column| (law.first + column, of(column))));
+                along.extend(law.form.shape_numbers().iter().enumerate().map(|(place, span)| {
+                    let moved = |size: f64| law.torque(&law.form.with_shape(span.index, size), *velocity, range.sign_width);
+                    (law.shapes + place, slope(law.form.shape[span.index], moved))
+                }));
+            }
+            let with = |(row, left): &(usize, f64)| {
+                along.iter().map(|(column, right)| left * right * self.covariance[row * numbers + column]).sum::<f64>()
+            };
+            curve.torque.push(sum(range.sign_width));
+            curve.sigma.push(if whole { along.iter().map(with).sum::<f64>().max(0.0).sqrt() } else { 0.0 });
+        }
+        curve
+    }
 }

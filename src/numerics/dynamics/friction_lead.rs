@@ -68,7 +68,7 @@ pub(super) fn take_friction_lead(problem: &mut TorqueProblem) -> bool {
     let gains: Vec<f64> = unmoved.iter().zip(&left).map(|(unmoved, left)| rows * (unmoved - left)).collect();
     let agreeing = gains.iter().filter(|gain| **gain > OWN_GAIN).count();
     let needed = ((AGREEING * gains.len() as f64).ceil() as usize).max(2);
-    let is_one = best.1.abs() > LEAST && gains.iter().sum::<f64>() > GAIN && agreeing >= needed;
+    let is_one = (LEAST..MOST - SAME).contains(&best.1.abs()) && gains.iter().sum::<f64>() > GAIN && agreeing >= needed;
     let found = if is_one { best.1 } else { 0.0 };
     let is_new = (found - before).abs() > SAME;
     problem.scene.friction_lead = if is_new { found } else { before };

@@ -71,6 +71,6 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
 }
 
 /// Whether one form modifies the friction that another is.
-fn modifies(form: &TorqueForm, friction: &TorqueForm) -> bool {
+pub(super) fn modifies(form: &TorqueForm, friction: &TorqueForm) -> bool {
     form.place == friction.place && form.cause.about().modifies.contains(&friction.cause.name())
 }

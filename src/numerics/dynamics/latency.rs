@@ -52,7 +52,11 @@ pub(super) fn latency(problem: &TorqueProblem) -> Option<Latency> {
     let shifts: Vec<f64> = (0..=steps).map(|step| SHIFTS[0] + SHIFTS[2] * step as f64).collect();
     let left: Vec<Vec<f64>> = shifts.iter().map(|shift| left_at(*shift)).collect();
     let total: Vec<f64> = left.iter().map(|joints| joints.iter().sum()).collect();
-    let least = (0..total.len()).min_by(|a, b| total[*a].total_cmp(&total[*b]))?.clamp(1, total.len() - 2);
+    let least = (0..total.len()).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
+    // What is least at an end would be less beyond it.
+    if least == 0 || least == total.len() - 1 {
+        return None;
+    }
     let unmoved = (0..shifts.len()).min_by(|a, b| shifts[*a].abs().total_cmp(&shifts[*b].abs()))?;
     let curvature = total[least + 1] - 2.0 * total[least] + total[least - 1];
     let aside = if curvature > 0.0 { 0.5 * (total[least - 1] - total[least + 1]) / curvature } else { 0.0 };

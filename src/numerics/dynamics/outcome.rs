@@ -5,7 +5,6 @@ use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
 use super::findings::{contact, findings, plain_finding};
-use super::friction_curve::friction_curves;
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
 use super::nameless::{absorb, absorb_drag, unconfirmed, unname};
@@ -48,7 +47,7 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     if let Some(enforced) = &enforced {
         remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
     }
-    let mut found = findings(&choice, (set, &solved.judged.silent), &held, (&uncertain, &solved.slopes));
+    let mut found = findings(&choice, &solved.judged, &held, (&uncertain, &solved.slopes), solved.other.as_ref());
     absorb(&choice, set, &free, &mut found);
     absorb_drag(&choice, set, &uncertain, &mut found);
     found.extend(problem.events.iter().map(contact));
@@ -66,6 +65,7 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
         false if found.is_empty() => VerdictKind::NothingMissing,
         false => VerdictKind::Explained,
     };
+    let model = TorqueModel::of(&choice, set, (&uncertain, &solved.slopes), &solution);
     TorqueDiagnosis {
         verdict,
         statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
@@ -87,8 +87,8 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
         events: problem.events.clone(),
         courses: courses(problem, &first, &last),
         inertials: inertials(problem, set, &uncertain, &solution),
-        friction: friction_curves(problem, set, &sweep, (&uncertain, &solved.slopes)),
-        model: TorqueModel::of(&choice, set, (&uncertain, &solved.slopes), &solution),
+        friction: model.friction_curves().unwrap_or_default(),
+        model,
         enforced,
     }
 }

@@ -38,6 +38,8 @@ pub(super) struct TorqueProblem<'a> {
     held_out: Vec<bool>,
     pub events: Vec<ContactEvent>,
     pub noise: Vec<JointNoise>,
+    /// Causes, with their places, of which only a number at an end of its search would explain the torques.
+    pub barred: Vec<(&'static str, Place)>,
     /// Least and greatest, C, where it was recorded.
     pub temperature: Option<[f64; 2]>,
 }
@@ -71,6 +73,7 @@ impl<'a> TorqueProblem<'a> {
             measured: Vec::new(),
             events: Vec::new(),
             noise: Vec::new(),
+            barred: Vec::new(),
             temperature: recording.temperature.as_deref().and_then(ends),
         };
         problem.shift(0.0);
@@ -79,7 +82,12 @@ impl<'a> TorqueProblem<'a> {
 
     /// Forms the columns.
     pub fn form(&mut self, without: &[String]) {
-        self.all = TorqueColumns::new(&self.scene, &self.reduction, &self.regressor, without);
+        let half_range = |joint: usize| {
+            let [least, most] = ends(&self.torque_at(joint, self.latency)).unwrap_or_default();
+            0.5 * (most - least)
+        };
+        let torque = (0..self.joints()).map(half_range).collect();
+        self.all = TorqueColumns::new(&self.scene, &self.reduction, &self.regressor, without, torque);
     }
 
     /// Takes a trial form; its number.

@@ -4,10 +4,12 @@ use super::arm::DynamicArm;
 use super::choice::{CauseChoice, backward, clear, other_friction};
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
+use super::drives::{OtherInertials, from_common};
 use super::friction_lead::take_friction_lead;
 use super::judge::{JudgedSet, judge};
 use super::latency::{Latency, latency};
 use super::leftover::lasting_form;
+use super::naming::{settle_names, take_out_ends};
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
@@ -21,8 +23,10 @@ use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
 
-/// Forms without a name that are looked for, at most.
+/// Rounds in which forms without a name are looked for, and others in place of those with a number at an end of its search, at most.
 const NAMELESS: usize = 4;
+/// Rounds in which others are looked for in place of forms that the polish brought to an end of their search, at most.
+const END_ROUNDS: usize = 3;
 /// s.
 const SAME_TIME: f64 = 0.1;
 /// Rounds in which a latency and the lead of friction find each other, at most.
@@ -36,6 +40,8 @@ pub(super) struct SolvedTorques<'a> {
     /// Slopes of the judged set.
     pub slopes: ShapeSlopes,
     pub latency: Option<Latency>,
+    /// Wrong masses or drives in place of those of the set.
+    pub other: Option<OtherInertials>,
 }
 
 /// Looks for causes.
@@ -63,7 +69,7 @@ pub(super) fn solve<'a>(
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
-    let mut set = from_common(&problem, &weighted, question.seed);
+    let (mut set, mut other) = from_common(&CauseChoice::new(&problem, &weighted, question.seed));
     let before = problem.events.clone();
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
@@ -71,15 +77,18 @@ pub(super) fn solve<'a>(
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
         weighted = problem.weighted();
-        set = from_common(&problem, &weighted, question.seed);
+        (set, other) = from_common(&CauseChoice::new(&problem, &weighted, question.seed));
     }
     tell(told(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     for _ in 0..NAMELESS {
         set = again(&mut problem, &mut weighted, set, question.seed);
+        let ended = take_out_ends(&mut problem, &mut weighted, &mut set);
         let lasting = lasting_form(&CauseChoice::new(&problem, &weighted, question.seed), &set);
-        let Some(form) = lasting else { break };
-        set.push(form);
+        if lasting.is_none() && !ended {
+            break;
+        }
+        set.extend(lasting);
         tell(told(&problem, &set));
     }
     if touched {
@@ -91,6 +100,13 @@ pub(super) fn solve<'a>(
     if rejudge(&mut problem, &mut weighted, &mut set, question.seed) {
         learn(&mut problem, &set);
         weighted = problem.weighted();
+    }
+    for _ in 0..END_ROUNDS {
+        if !take_out_ends(&mut problem, &mut weighted, &mut set) {
+            break;
+        }
+        set = again(&mut problem, &mut weighted, set, question.seed);
+        polish(&mut problem, &mut weighted, &mut set);
     }
     let mut judged = {
         let choice = CauseChoice::new(&problem, &weighted, question.seed);
@@ -104,8 +120,8 @@ pub(super) fn solve<'a>(
         judged
     };
     polish(&mut problem, &mut weighted, &mut judged.set);
-    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
-    SolvedTorques { problem, weighted, judged, slopes, latency: found }
+    let slopes = settle_names(&mut problem, &mut weighted, &mut judged, question.seed);
+    SolvedTorques { problem, weighted, judged, slopes, latency: found, other }
 }
 
 /// Finds by how much torques come late and by how much friction turns before the velocity, each given the other, and takes both.
@@ -120,12 +136,6 @@ fn clocked(problem: &mut TorqueProblem, question: &TorqueQuestion, is_asked: boo
         problem.form(&question.without);
     }
     found
-}
-
-/// Searches from what hardly an arm is without.
-fn from_common(problem: &TorqueProblem, weighted: &WeightedColumns, seed: u64) -> Vec<usize> {
-    let choice = CauseChoice::new(problem, weighted, seed);
-    search(&choice, choice.common())
 }
 
 /// Sets rows aside in which the residual of a set looks like a push.

@@ -16,6 +16,14 @@ pub trait TorqueSource {
     /// # Errors
     /// What reading fails with, and what `take` fails with.
     fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()>;
+
+    /// Recorded rows that some rows (ascending) are, or come after where they are made up.
+    ///
+    /// # Errors
+    /// What reading it fails with.
+    fn recorded(&self, rows: &[usize]) -> Result<Vec<usize>> {
+        Ok(rows.to_vec())
+    }
 }
 
 impl TorqueSource for TorqueRecording {

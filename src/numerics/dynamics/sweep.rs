@@ -64,7 +64,7 @@ impl<'a> SweptColumns<'a> {
 
     /// Takes a column.
     pub fn take(&mut self, column: usize) {
-        let prior = self.all.prior.get(column).copied().unwrap_or(0.0);
+        let prior = self.prior(column);
         let own = self.weighted.gram[column][column] + prior;
         let mut row = self.weighted.gram[column].clone();
         for known in &self.rows {
@@ -88,6 +88,11 @@ impl<'a> SweptColumns<'a> {
         self.along.push(along);
     }
 
+    /// 1 / variance beforehand of a coefficient.
+    fn prior(&self, column: usize) -> f64 {
+        self.all.prior.get(column).copied().unwrap_or(0.0)
+    }
+
     /// What a form would gain, given the present ones.
     pub fn gain(&self, form: usize) -> Gain {
         self.gain_of(form, &self.right)
@@ -106,7 +111,7 @@ impl<'a> SweptColumns<'a> {
         let scale: Vec<f64> = columns.iter().map(|column| own(column).max(f64::MIN_POSITIVE).sqrt()).collect();
         let mut block =
             DMatrix::from_fn(columns.len(), columns.len(), |a, b| swept(columns[a], columns[b]) / (scale[a] * scale[b]));
-        (0..columns.len()).for_each(|k| block[(k, k)] += REDUNDANT);
+        (0..columns.len()).for_each(|k| block[(k, k)] += REDUNDANT + self.prior(columns[k]) / (scale[k] * scale[k]));
         let right = DVector::from_fn(columns.len(), |a, _| self.right[columns[a]] / scale[a]);
         match block.cholesky() {
             Some(factor) => factor.solve(&right).iter().zip(&scale).map(|(value, scale)| value / scale).collect(),
@@ -137,6 +142,7 @@ impl<'a> SweptColumns<'a> {
                 let swept: f64 = self.rows.iter().map(|row| row[first + a] * row[first + b]).sum();
                 block[10 * a + b] = (self.weighted.gram[first + a][first + b] - swept) / (scale * other).sqrt();
             }
+            block[11 * a] += self.prior(first + a) / scale;
             along[a] = right[first + a] / scale.sqrt();
         }
         small_gain(&mut block, &mut along, width)
@@ -150,6 +156,11 @@ impl<'a> SweptColumns<'a> {
         let values = DVector::from_vec(values);
         let square = covariance.cholesky().map_or(0.0, |factor| values.dot(&factor.solve(&values)));
         Gain { square, rank: columns.len() }
+    }
+
+    /// Whether a form is among the present ones.
+    pub fn has(&self, form: usize) -> bool {
+        self.all.of(form).any(|column| self.pivots.contains(&column))
     }
 
     /// Coefficients of the pivots.

@@ -4,6 +4,7 @@ use super::arm::DynamicArm;
 use super::bridge::{self, Bridged};
 use super::check;
 use super::clock::RecordingClock;
+use super::even::EvenSource;
 use super::recording::TorqueRecording;
 use super::source::TorqueSource;
 use super::survey::RecordingSurvey;
@@ -31,6 +32,14 @@ impl UsedRecording {
 
     /// The same with room for another number of rows.
     pub fn within(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
+        let Some(even) = EvenSource::of(source)? else { return Self::of_even(arm, source, cutoff, most) };
+        let mut used = Self::of_even(arm, &even, cutoff, most)?;
+        used.remarks.insert(0, even.remark);
+        Ok(used)
+    }
+
+    /// Of a recording whose clock goes in even steps.
+    fn of_even(arm: &DynamicArm, source: &dyn TorqueSource, cutoff: Option<f64>, most: usize) -> Result<Self> {
         if source.rows() > most { Self::thinned(arm, source, cutoff, most) } else { Self::whole(arm, source) }
     }
 
@@ -47,6 +56,7 @@ impl UsedRecording {
         check::check(arm, &whole)?;
         let recorded = whole.rows();
         let Bridged { recording, origin } = Bridged::of(whole);
+        let origin = source.recorded(&origin)?;
         let clock = RecordingClock::of(&recording);
         let odd = check::remarks(&recording, &origin, &clock);
         let remarks = odd.into_iter().chain(bridge::remark(recording.rows() - recorded)).collect();
@@ -60,8 +70,11 @@ impl UsedRecording {
         let ThinnedRecording { recording, clock, origin, made_up, tears } = ThinnedRecording::of(source, &survey, &plan)?;
         check::check(arm, &recording)?;
         let mut remarks = vec![said(source.rows(), &recording, &plan, clock.rate)];
-        remarks.extend(tears.iter().map(|(row, lasted)| check::torn_at(*row, *lasted, survey.pace.usual)));
-        remarks.extend(check::of_clock_and_sets(&recording, 1.0 / clock.rate));
+        let (rows, lasted): (Vec<usize>, Vec<f64>) = tears.into_iter().unzip();
+        let tears = source.recorded(&rows)?.into_iter().zip(lasted);
+        remarks.extend(check::few(tears.map(|(row, lasted)| check::torn_at(row, lasted, survey.pace.usual))));
+        remarks.extend(check::of_sets(&recording));
+        let origin = source.recorded(&origin)?;
         remarks.extend(bridge::remark(made_up));
         Ok(Self { recording, clock, origin, remarks })
     }

@@ -196,10 +196,12 @@ fn cut(sheet: &mut Sheet, name: &str, share: f64) {
     sheet.change(&[name.into()], |value| value.clamp(-share * most, share * most));
 }
 
-const SPOILED: [Spoiled; 12] = [
+const SPOILED: [Spoiled; 14] = [
     ("seven7r", "Nmm for Nm", |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e3 * x), 10, &["torque", "a unit", "1,000"]),
     ("seven7r", "kNm for Nm", |sheet| sheet.change(&each("tau{j}_nm", 7), |x| 1e-3 * x), 10, &["torque", "a unit", "1,000"]),
     ("compact6", "mA for A", |sheet| sheet.change(&each("i{j}_a", 6), |x| 1e3 * x), 10, &["torque", "a unit", "1,000"]),
+    ("seven7r", "A for Nm", |sheet| sheet.change(&each("tau{j}_nm", 7), |x| x / 12.0), 10, &["torque", "map them as `current`"]),
+    ("compact6", "Nm for A", |sheet| sheet.change(&each("i{j}_a", 6), |x| 12.0 * x), 10, &["torque", "map them as `torque`"]),
     ("compact6", "currents exchanged", |sheet| sheet.exchange("i2_a", "i3_a"), 10, &["joint 2 and joint 3 look exchanged"]),
     (
         "compact6",

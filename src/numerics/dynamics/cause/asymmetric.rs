@@ -24,7 +24,7 @@ impl TorqueCause for Asymmetric {
         fill(out, |row| scene.direction(joint, row).max(0.0));
     }
 
-    fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {
+    fn friction(&self, _form: &TorqueForm, _column: usize, _velocity: f64, sign: f64) -> Option<f64> {
         Some(sign.max(0.0))
     }
 

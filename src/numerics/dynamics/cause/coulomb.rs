@@ -16,6 +16,7 @@ impl TorqueCause for Coulomb {
         price: 0.0,
         of_sign: true,
         rich: true,
+        brakes: true,
     }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
@@ -27,7 +28,7 @@ impl TorqueCause for Coulomb {
         fill(out, |row| scene.direction(joint, row));
     }
 
-    fn friction(&self, _form: &TorqueForm, _velocity: f64, sign: f64) -> Option<f64> {
+    fn friction(&self, _form: &TorqueForm, _column: usize, _velocity: f64, sign: f64) -> Option<f64> {
         Some(sign)
     }
 

@@ -32,12 +32,15 @@ use super::inertials::DeclaredInertials;
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::scene::DynamicScene;
 use super::types::TorqueParameter;
+use crate::criteria::torque::AT_END;
 use crate::effect::Place;
 pub use coulomb::COULOMB;
 pub(super) use offset::OFFSET;
 pub(super) use rotor::ROTOR;
+pub(super) use torque_constant::TORQUE_CONSTANT;
 pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
+pub use viscous::line_of_power;
 
 /// All causes with columns; latency and contacts are looked for before.
 pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
@@ -85,6 +88,14 @@ pub(super) struct ShapeSpan {
     pub usual: Option<f64>,
 }
 
+impl ShapeSpan {
+    /// Whether a number is at an end of what is looked for.
+    fn ends_at(&self, value: f64) -> bool {
+        let near = |end: f64| (value / end).ln().abs() < *AT_END;
+        near(self.least) || near(self.most)
+    }
+}
+
 /// What a cause is, whatever its form.
 pub(super) struct TorqueCauseDescription {
     /// Canonical.
@@ -99,6 +110,8 @@ pub(super) struct TorqueCauseDescription {
     pub rich: bool,
     /// Whether its coefficients can only be positive: a friction that falls with speed, a rotor.
     pub positive: bool,
+    /// Whether it brakes, so that its coefficient is positive unless a curve of speed without a name stands beside it, with which it is a sum.
+    pub brakes: bool,
     /// Whether it is, like others of its kind, a torque over its joint's angle: one curve looks like several of others.
     pub of_angle: bool,
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
@@ -121,6 +134,7 @@ const PLAIN: TorqueCauseDescription = TorqueCauseDescription {
     modifies: &[],
     rich: false,
     positive: false,
+    brakes: false,
     of_angle: false,
     inertial: false,
     alike_at_joints: false,
@@ -185,13 +199,21 @@ pub(super) trait TorqueCause: Sync {
     fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
         Vec::new()
     }
-    /// Torque per coefficient at a velocity and its smoothed sign, for causes of one column that are friction over velocity.
-    fn friction(&self, _form: &TorqueForm, _velocity: f64, _sign: f64) -> Option<f64> {
+    /// Torque per coefficient of a column at a velocity and its smoothed sign, for causes that are friction over velocity.
+    fn friction(&self, _form: &TorqueForm, _column: usize, _velocity: f64, _sign: f64) -> Option<f64> {
         None
+    }
+    /// Whether it is a curve of speed, neither proportional to it nor of one size: one without a name stands for all of them.
+    fn bends(&self, _form: &TorqueForm) -> bool {
+        false
     }
     /// Whether its forms have such shape numbers, by which causes of one name are known from each other.
     fn has_shape(&self, _shape: &[f64]) -> bool {
         true
+    }
+    /// Whether a number of it that is counted, as an order, is the last that is tried.
+    fn has_ends(&self, _form: &TorqueForm) -> bool {
+        false
     }
     /// Its numbers as people read them: its coefficients and shape numbers unless it has others.
     fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
@@ -250,6 +272,27 @@ impl TorqueForm {
     /// Its link, from 0.
     pub fn link(&self) -> usize {
         self.joint()
+    }
+
+    /// Whether it is a curve of speed without a name, which viscous and Coulomb friction of its joint are parts of.
+    pub fn is_nameless_curve(&self) -> bool {
+        self.cause.name() == UNKNOWN && self.cause.bends(self)
+    }
+
+    /// Whether a curve without a name and another curve of speed would be one sum at one joint.
+    pub fn is_one_curve_with(&self, other: &Self) -> bool {
+        let [one, two] = [self, other].map(|form| form.cause.bends(form));
+        self.place == other.place && one && two && (self.is_nameless_curve() || other.is_nameless_curve())
+    }
+
+    /// The same with the numbers that are at an end of their search as they usually are; none where one of them has nothing usual. What is
+    /// best at an end would be better beyond it.
+    pub fn within_ends(&self) -> Option<Self> {
+        let mut within = self.clone();
+        for span in self.shape_numbers().into_iter().filter(|span| span.ends_at(self.shape[span.index])) {
+            within.shape[span.index] = span.usual?;
+        }
+        (!self.cause.has_ends(self)).then_some(within)
     }
 
     /// Whether both are the same cause at the same place.

@@ -6,7 +6,7 @@ use crate::dynamics::scene::DynamicScene;
 /// Its name.
 pub(in crate::dynamics) const OFFSET: &str = "current_offset";
 
-/// A constant torque that no mass explains: the zero of a current or torque sensor. With a shape (s, and the longest that shows) a part of it
+/// A constant torque that no mass explains: the zero of a current or torque sensor. With a shape (s, and the end of its search) a part of it
 /// comes only as the sensor warms up.
 pub(super) struct Offset;
 
@@ -16,13 +16,16 @@ const TIMES: [f64; 3] = [5.0, USUAL, 45.0];
 const USUAL: f64 = 15.0;
 /// Share of the recording: a zero that moves for longer is one that stays.
 const LONGEST: f64 = 0.45;
+/// Share of the recording at which the search for it ends: what is best there is not known.
+const END: f64 = 0.9;
 
 impl TorqueCause for Offset {
     about! { name: OFFSET, coefficients: &[("offset", "Nm"), ("cold", "Nm")], of_angle: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let longest = LONGEST * scene.duration();
-        let times: Vec<[f64; 2]> = TIMES.into_iter().filter(|time| *time <= longest).map(|time| [time, longest]).collect();
+        let times: Vec<[f64; 2]> =
+            TIMES.into_iter().filter(|time| *time <= longest).map(|time| [time, END * scene.duration()]).collect();
         let times: Vec<&[f64]> = times.iter().map(|shape| &shape[..]).collect();
         let steady = at_each_joint(&Offset, scene, 1);
         steady.into_iter().chain(at_each_joint_with(&Offset, scene, 2, &times)).collect()

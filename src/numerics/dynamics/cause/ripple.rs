@@ -7,10 +7,9 @@ use crate::dynamics::types::TorqueParameter;
 /// Cosine and sine of an order; `with` holds the order and whether it is of the motor.
 pub(super) struct Ripple;
 
-/// Per turn of the joint.
-const ORDERS: usize = 8;
-/// Per turn of the motor.
-const MOTOR_ORDERS: usize = 2;
+/// Per turn of the joint, and of the motor; the last of each only shows that the order is beyond.
+const ORDERS: usize = 9;
+const MOTOR_ORDERS: usize = 3;
 /// Lowest orders stand in the rich model.
 const USUAL: usize = 4;
 
@@ -46,6 +45,10 @@ impl TorqueCause for Ripple {
             }
         }
         forms
+    }
+
+    fn has_ends(&self, form: &TorqueForm) -> bool {
+        form.with[0] >= [ORDERS, MOTOR_ORDERS][form.with[1].min(1)]
     }
 
     fn is_rich(&self, form: &TorqueForm) -> bool {

@@ -15,7 +15,7 @@ const REST: f64 = 0.006;
 const OVER: f64 = 20.0;
 
 impl TorqueCause for Spikes {
-    about! { name: "backlash_spikes", coefficients: &[("height", "Nm")], price: 25.0 }
+    about! { name: "backlash_spikes", coefficients: &[("height", "Nm")], price: 25.0, positive: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Spikes, scene, 1, &TIMES)

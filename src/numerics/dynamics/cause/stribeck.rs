@@ -53,8 +53,12 @@ impl TorqueCause for Stribeck {
         fill(out, |row| scene.direction(form.joint(), row) * falls(form, velocity[row]));
     }
 
-    fn friction(&self, form: &TorqueForm, velocity: f64, sign: f64) -> Option<f64> {
+    fn friction(&self, form: &TorqueForm, _column: usize, velocity: f64, sign: f64) -> Option<f64> {
         Some(sign * falls(form, velocity))
+    }
+
+    fn bends(&self, _form: &TorqueForm) -> bool {
+        true
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String {

@@ -3,6 +3,9 @@
 use super::{FittedNumber, ShapeSpan, TorqueCause, TorqueForm, about, at_each_joint, fill};
 use crate::dynamics::scene::DynamicScene;
 
+/// Its name.
+pub(in crate::dynamics) const TORQUE_CONSTANT: &str = "torque_constant";
+
 /// A current that makes another torque than declared. With a shape (Nm, and the largest torque of the joint) the difference falls with
 /// torque, to half at so many Nm: iron saturates, and a table of a drive is right at its rated current.
 pub(super) struct TorqueConstant;
@@ -16,7 +19,7 @@ const MOST: f64 = 0.6;
 
 impl TorqueCause for TorqueConstant {
     about! {
-        name: "torque_constant",
+        name: TORQUE_CONSTANT,
         coefficients: &[("relative", "1")],
         inertial: true,
         of_rigid: true,

@@ -13,7 +13,7 @@ pub(super) struct Viscous;
 const EXPONENTS: [f64; 2] = [0.4, 1.6];
 
 impl TorqueCause for Viscous {
-    about! { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true }
+    about! { name: VISCOUS, coefficients: &[("viscous", "Nm s/rad")], price: 0.0, rich: true, brakes: true }
 
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         at_each_joint_with(&Viscous, scene, 1, &[&[1.0]])
@@ -30,7 +30,7 @@ impl TorqueCause for Viscous {
         fill(out, |row| power(form, scene.velocity[joint][row]));
     }
 
-    fn friction(&self, form: &TorqueForm, velocity: f64, _sign: f64) -> Option<f64> {
+    fn friction(&self, form: &TorqueForm, _column: usize, velocity: f64, _sign: f64) -> Option<f64> {
         Some(power(form, velocity))
     }
 
@@ -39,12 +39,20 @@ impl TorqueCause for Viscous {
         match exponent(form) {
             None => format!("{place} has viscous friction of {size:.3} Nm s/rad"),
             Some(exponent) => {
-                format!(
-                    "{place} has viscous friction of {size:.3} Nm at 1 rad/s, which grows with the power {exponent:.2} of speed"
-                )
+                format!("{place} has viscous friction of {size:.3} Nm s/rad, which grows with the power {exponent:.2} of speed")
             }
         }
     }
+}
+
+/// The straight line nearest to a power of speed over all speeds up to the fastest: at rest, and its slope. Viscous and Coulomb friction that
+/// grow with another power are parts of one sum, and as numbers are those of its line.
+pub fn line_of_power(exponent: f64, fastest: f64) -> [f64; 2] {
+    // Over shares x of the fastest speed: means of x^e and of x x^e.
+    let (mean, moment) = (1.0 / (exponent + 1.0), 1.0 / (exponent + 2.0));
+    let slope = 12.0 * (moment - 0.5 * mean);
+    let scale = fastest.powf(exponent);
+    [scale * (mean - 0.5 * slope), scale * slope / fastest.max(f64::MIN_POSITIVE)]
 }
 
 /// Where it is not 1.

@@ -3,13 +3,15 @@
 use super::{COULOMB, FittedNumber, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, about, fill};
 use crate::dynamics::scene::DynamicScene;
 
-/// exp(-t / T) times velocity and its sign; shape: T and the longest of it, `with` marks the form that stands in the rich model.
+/// exp(-t / T) times velocity and its sign; shape: T and the end of its search, `with` marks the form that stands in the rich model.
 pub(super) struct Warmup;
 
 /// s.
 const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];
 /// Share of the recording: what lasts longer is friction that stays.
 const LONGEST: f64 = 0.45;
+/// Share of the recording at which the search for it ends: what is best there is not known.
+const END: f64 = 0.9;
 /// s, the longest that stands in the rich model.
 const USUAL: f64 = 18.0;
 
@@ -28,7 +30,7 @@ impl TorqueCause for Warmup {
         let of = |joint| {
             let form = move |time: &f64| {
                 let with = [usize::from(Some(*time) == rich), 0];
-                TorqueForm { with, ..TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, longest]) }
+                TorqueForm { with, ..TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, END * scene.duration()]) }
             };
             times.iter().map(form).collect::<Vec<_>>()
         };

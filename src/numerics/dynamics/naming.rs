@@ -1,0 +1,122 @@
+//! What of a set is named. A number at an end of its search would be better beyond it, friction that drives is none, and what is less than
+//! two standard deviations may as well be nothing: such forms leave the set, or stay as parts of a sum without a name.
+
+use super::cause::{TorqueForm, UNKNOWN};
+use super::choice::CauseChoice;
+use super::friction_line::number_of_line;
+use super::judge::{JudgedSet, modifies};
+use super::polish::polish;
+use super::problem::TorqueProblem;
+use super::shape_slopes::ShapeSlopes;
+use super::weighted::WeightedColumns;
+use crate::criteria::torque::NAMED;
+
+/// Forms that lose their name one after the other, at most.
+const ROUNDS: usize = 40;
+
+/// What becomes of a form.
+enum Unnamed {
+    /// At a position of the set: it leaves.
+    Out(usize),
+    /// It stays in the model without a name.
+    Silent(usize),
+    /// Numbers at an end are what they usually are.
+    Within(usize, TorqueForm),
+}
+
+/// Takes forms with a number at an end of its search out of a set, and their causes out of the search at their places; tells whether any was.
+pub(super) fn take_out_ends(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut Vec<usize>) -> bool {
+    let mut changed = false;
+    while let Some(one) = at_end(problem, set) {
+        changed = true;
+        match one {
+            Unnamed::Within(place, form) => set[place] = push(problem, weighted, form),
+            Unnamed::Out(place) | Unnamed::Silent(place) => {
+                let form = &problem.all.forms[set.remove(place)];
+                problem.barred.push((form.cause.name(), form.place));
+            }
+        }
+    }
+    changed
+}
+
+/// The first form of a set with a number at an end.
+fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<Unnamed> {
+    set.iter().enumerate().find_map(|(place, number)| {
+        let form = &problem.all.forms[*number];
+        match form.within_ends() {
+            _ if form.cause.name() == UNKNOWN => None,
+            None => Some(Unnamed::Out(place)),
+            Some(within) => (within.shape != form.shape).then_some(Unnamed::Within(place, within)),
+        }
+    })
+}
+
+/// Takes names off until all that are left are right; the slopes of what is left.
+pub(super) fn settle_names(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    judged: &mut JudgedSet,
+    seed: u64,
+) -> ShapeSlopes {
+    for _ in 0..ROUNDS {
+        let slopes = ShapeSlopes::of(problem, weighted, &judged.set);
+        let next = at_end(problem, &judged.set).or_else(|| next(&CauseChoice::new(problem, weighted, seed), judged, &slopes));
+        match next {
+            None => return slopes,
+            Some(Unnamed::Silent(place)) => {
+                judged.silent.push(judged.set[place]);
+                continue;
+            }
+            Some(Unnamed::Out(place)) => _ = judged.set.remove(place),
+            Some(Unnamed::Within(place, form)) => judged.set[place] = push(problem, weighted, form),
+        }
+        polish(problem, weighted, &mut judged.set);
+    }
+    ShapeSlopes::of(problem, weighted, &judged.set)
+}
+
+/// A form as a number of the problem.
+fn push(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, form: TorqueForm) -> usize {
+    let number = problem.push(form);
+    let runs = problem.runs(false);
+    problem.all.of(number).for_each(|column| weighted.push(&problem.all.columns[column], problem.weighing(&runs)));
+    number
+}
+
+/// The form with the least right to its name.
+fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Option<Unnamed> {
+    let (all, set) = (&choice.problem.all, &judged.set);
+    let sweep = choice.base.with(set);
+    let solution = sweep.solution();
+    let uncertain = slopes.beside(&sweep);
+    let named = |place: &usize| {
+        let form = choice.form(set[*place]);
+        form.cause.name() != UNKNOWN && !judged.silent.iter().any(|silent| choice.form(*silent).is_called_as(form))
+    };
+    // The largest of its numbers in standard deviations, with its sign.
+    let sure = |place: usize| {
+        if let Some(line) = number_of_line(choice, set, set[place], &solution, (&uncertain, slopes)) {
+            return line.value / line.sigma.max(f64::MIN_POSITIVE);
+        }
+        let columns: Vec<usize> = all.of(set[place]).collect();
+        let covariance = uncertain.covariance(&columns);
+        let of = |(k, column): (usize, &usize)| {
+            let value = solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value);
+            value / covariance[k * (columns.len() + 1)].max(f64::MIN_POSITIVE).sqrt()
+        };
+        columns.iter().enumerate().map(of).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+    };
+    let wrong = |place: usize, sure: f64| choice.form(set[place]).cause.about().brakes && sure <= 0.0;
+    let weak = (0..set.len()).filter(named).map(|place| (place, sure(place)));
+    let weak = weak.filter(|(place, sure)| sure.abs() < *NAMED || wrong(*place, *sure));
+    let (place, sure) = weak.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let form = choice.form(set[place]);
+    let mut leaning = (0..set.len()).filter(|other| modifies(choice.form(set[*other]), form));
+    let is_summed = choice.is_part_of_curve(form, |other| set.contains(&other));
+    if is_summed || (form.cause.about().brakes && sure > 0.0) {
+        return Some(Unnamed::Silent(place));
+    }
+    // What leans on friction that is none is none either.
+    Some(Unnamed::Out(leaning.next().unwrap_or(place)))
+}
