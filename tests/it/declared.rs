@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    Axes, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion, Polar,
-    ShapeRange, Starts, Survey, Term, Variable, cause,
+    Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion,
+    Polar, ShapeRange, Starts, Survey, Term, Variable, cause,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -89,7 +89,7 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
             declaration("joint 3", "axis", &["sin(q)", "cos(q)"]),
             term(
                 "axis_wobble",
-                Motion::Axis { joint, about: None, turning: false },
+                Motion::Axis { joint, about: None, turning: false, at: AxisPoint::Own },
                 Law::new(Variable::Angle { joint }, Basis::Wave { order: 1, overtone: false }),
             ),
         ),

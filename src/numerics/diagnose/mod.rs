@@ -79,7 +79,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let (next, answer) = without_empty(fitter.held_to_a_common_size(next), answer, &fitter);
         tell(words::of_the_conclusions(&next));
         let survey = view.survey();
-        let last = LastRound { view: &view, survey: &survey, state: next, answer, scale: fitter.scale, without: question.without };
+        let last =
+            LastRound { view: &view, survey: &survey, state: next, answer, scale: fitter.scale, without: question.without };
         return conclude(last, &fitter, &before);
     }
 }

@@ -2,8 +2,8 @@
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::{
-    AxisPoint, Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term, Variable, about,
-    names,
+    AxisPoint, Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
+    Variable, about, names,
 };
 use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
@@ -40,8 +40,7 @@ impl Cause for AxisWobble {
             ways.flat_map(move |(at, order, turning)| {
                 let law = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
                 let odds = if at == AxisPoint::Own { 0.0 } else { *RARE };
-                [None, Some(0), Some(1)]
-                    .map(|about| (Term::new(&Self, Motion::Axis { joint, about, turning, at }, law), odds))
+                [None, Some(0), Some(1)].map(|about| (Term::new(&Self, Motion::Axis { joint, about, turning, at }, law), odds))
             })
         });
         let one = |(form, odds): (Term, f64)| Hypothesis::new(form, *WOBBLES).penalised(*RARE + odds).within(LARGEST);

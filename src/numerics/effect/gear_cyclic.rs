@@ -3,8 +3,8 @@
 use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
-    Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about,
-    figure, names, orders,
+    Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about, figure,
+    names, orders,
 };
 use crate::criteria::effect::{LOW_ORDERS, UNCOMMON};
 use crate::robot::RobotModel;
@@ -104,10 +104,8 @@ impl Cause for GearCyclic {
 /// An order and its amplitude in words.
 fn order(term: &Term, numbers: &[&ParameterEstimate]) -> String {
     let Some(order) = orders::order(term.basis()) else { return String::new() };
-    let overtone = numbers
-        .get(2..)
-        .filter(|pair| pair.len() >= 2)
-        .map(|pair| format!(" and {} times by {}", 2.0 * order, amplitude(pair)));
+    let overtone =
+        numbers.get(2..).filter(|pair| pair.len() >= 2).map(|pair| format!(" and {} times by {}", 2.0 * order, amplitude(pair)));
     let order = figure(order, if order.fract().abs() < 1e-9 { 0 } else { 2 });
     format!("{order} times a turn by {}{}", amplitude(numbers), overtone.unwrap_or_default())
 }

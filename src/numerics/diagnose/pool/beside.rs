@@ -1,7 +1,7 @@
 //! New forms judged beside a set of hypotheses and the base model, without a place in the pool.
 
-use super::hypotheses::HypothesisSet;
 use super::cholesky::PivotedCholesky;
+use super::hypotheses::HypothesisSet;
 use super::linear::dot;
 use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};

@@ -39,12 +39,7 @@ const CHUNK: usize = 64;
 
 impl<'a> HypothesisSet<'a> {
     /// `residual` is that of the model without any of the hypotheses; `jacobian` that of the base model.
-    pub fn new(
-        problem: &'a WhitenedProblem<'a>,
-        jacobian: &Mat<f64>,
-        residual: &[f64],
-        hypotheses: Vec<Hypothesis>,
-    ) -> Self {
+    pub fn new(problem: &'a WhitenedProblem<'a>, jacobian: &Mat<f64>, residual: &[f64], hypotheses: Vec<Hypothesis>) -> Self {
         let mut pool = Self::empty(problem, orthonormal(jacobian), residual);
         pool.add(hypotheses);
         pool

@@ -220,7 +220,8 @@ impl Table<'_, '_> {
             let super::cell::Shapes::Listed(groups) = &cell.shapes else { continue };
             for group in groups {
                 let [form] = &group.forms[..] else { continue };
-                if form.cause().hidden(form, self.survey.robot).is_none() || components.iter().any(|own| own.forms.contains(form)) {
+                if form.cause().hidden(form, self.survey.robot).is_none() || components.iter().any(|own| own.forms.contains(form))
+                {
                     continue;
                 }
                 let block = Block::of(vec![group.clone()], self.frame);

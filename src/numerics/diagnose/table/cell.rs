@@ -127,8 +127,7 @@ impl FreeShape {
         let fields = fields(self.motion);
         match self.over {
             Over::Step => {
-                let times: Vec<f64> =
-                    if closely { survey.boundaries.clone() } else { survey.changes(STEPS).collect() };
+                let times: Vec<f64> = if closely { survey.boundaries.clone() } else { survey.changes(STEPS).collect() };
                 let log_weight = -(times.len().max(1) as f64).ln();
                 let form = |at| self.term(Law::new(self.of, Basis::After { at }));
                 times.into_iter().map(|at| ShapeGroup::of(form(at), log_weight)).collect()
@@ -208,7 +207,13 @@ fn with_all_steps(groups: &[ShapeGroup], survey: &Survey) -> Vec<ShapeGroup> {
 }
 
 /// A cause's line and a curve over the same variable, as one physics: a line, or one that is not quite straight.
-pub(super) fn not_quite_straight(line: Form, motion: Motion, of: Variable, values: &[f64], log_weight: f64) -> Option<ShapeGroup> {
+pub(super) fn not_quite_straight(
+    line: Form,
+    motion: Motion,
+    of: Variable,
+    values: &[f64],
+    log_weight: f64,
+) -> Option<ShapeGroup> {
     const COUNT: usize = 12;
     if has_few(values) {
         return None;

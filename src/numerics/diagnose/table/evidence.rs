@@ -168,7 +168,8 @@ mod tests {
             let prior = DMatrix::from_diagonal(&DVector::from_row_slice(&shares)) * (amplitude * amplitude);
             let covariance = DMatrix::identity(9, 9) + &columns * prior * columns.transpose();
             let solved = covariance.clone().lu().solve(&residual).expect("a covariance");
-            let [with, without] = [residual.dot(&solved), residual.norm_squared()].map(|square| 0.5 * (9.0 + *NU) * (*NU + square).ln());
+            let [with, without] =
+                [residual.dot(&solved), residual.norm_squared()].map(|square| 0.5 * (9.0 + *NU) * (*NU + square).ln());
             without - with - 0.5 * covariance.determinant().ln()
         };
         let logs: Vec<f64> = amplitudes().map(at).collect();

@@ -124,7 +124,10 @@ fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
         // What carries the first joint is the base.
         Place::Joint(joint) if joint > 0 && survey.robot.is_revolute(joint) => vec![
             vec![Motion::Joint { joint }],
-            vec![false, true].into_iter().map(|turning| Motion::Axis { joint, about: None, turning, at: AxisPoint::Own }).collect(),
+            vec![false, true]
+                .into_iter()
+                .map(|turning| Motion::Axis { joint, about: None, turning, at: AxisPoint::Own })
+                .collect(),
             vec![Motion::Slide { joint, along: true }],
             vec![Motion::Slide { joint, along: false }],
         ],

@@ -64,7 +64,8 @@ impl Rounds {
         let question = fitter.question;
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
         let keeps = |cell: &cell::Cell| {
-            !(fitter.causes_of_the_arm_first() && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
+            !(fitter.causes_of_the_arm_first()
+                && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
         };
         let mut table = Table::new(&mut frame, &survey, question.without, question.own, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
@@ -130,7 +131,10 @@ fn estimated(table: &Table, components: &[Component]) -> Vec<EstimatedCause> {
             out.push(EstimatedCause {
                 form,
                 coefficients: kept.iter().map(|k| coefficients[range.start + k]).collect(),
-                priors: kept.iter().map(|k| Prior { mean: 0.0, sigma: sigmas[range.start + k].max(f64::MIN_POSITIVE.sqrt()) }).collect(),
+                priors: kept
+                    .iter()
+                    .map(|k| Prior { mean: 0.0, sigma: sigmas[range.start + k].max(f64::MIN_POSITIVE.sqrt()) })
+                    .collect(),
             });
         }
     }

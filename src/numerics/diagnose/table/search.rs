@@ -92,13 +92,14 @@ impl<'f, 'a> Table<'f, 'a> {
             if !motions.contains(&term.motion()) {
                 motions.push(term.motion());
             }
-            variables.extend(term.law().variables().into_iter().filter(|of| of.is_single() && !variables.contains(of)).collect::<Vec<_>>());
+            variables.extend(
+                term.law().variables().into_iter().filter(|of| of.is_single() && !variables.contains(of)).collect::<Vec<_>>(),
+            );
         }
         frame.prepare(&motions, &variables);
         let frame = &*frame;
         let values = |of: Variable| frame.values(of);
-        let coarse: Vec<Block> =
-            named.par_iter().map(|cell| Block::of(cell.groups(survey, &values, false), frame)).collect();
+        let coarse: Vec<Block> = named.par_iter().map(|cell| Block::of(cell.groups(survey, &values, false), frame)).collect();
         let fine = named.iter().map(|_| OnceLock::new()).collect();
         let mut columns = 0;
         let mut first = Vec::with_capacity(coarse.len());
@@ -107,7 +108,20 @@ impl<'f, 'a> Table<'f, 'a> {
             columns += block.columns.values.ncols();
         }
         let products = BTreeMap::new();
-        Self { frame, survey, cells: named, coarse, fine, products, parts: PartProducts::default(), first, columns, next: 0, from_before: Vec::new(), multiplied: shown.to_vec() }
+        Self {
+            frame,
+            survey,
+            cells: named,
+            coarse,
+            fine,
+            products,
+            parts: PartProducts::default(),
+            first,
+            columns,
+            next: 0,
+            from_before: Vec::new(),
+            multiplied: shown.to_vec(),
+        }
     }
 
     /// The cell of a key.
@@ -190,14 +204,16 @@ impl<'f, 'a> Table<'f, 'a> {
             let range = self.first[cell]..self.first[cell] + self.coarse[cell].columns.values.ncols();
             (self.coarse[cell].overlap(&along[range]), cell)
         };
-        let mut all: Vec<(f64, usize)> = (0..self.cells.len()).into_par_iter().map(overlap).filter(|(share, _)| *share > ALIKE).collect();
+        let mut all: Vec<(f64, usize)> =
+            (0..self.cells.len()).into_par_iter().map(overlap).filter(|(share, _)| *share > ALIKE).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         all.into_iter().take(most).map(|(_, cell)| cell).collect()
     }
 
     /// The same of a block's columns, from the components that the state has.
     pub fn across_block(&self, block: &Block, state: &State, components: &[&Component]) -> DMatrix<f64> {
-        let parts: Vec<DMatrix<f64>> = components.iter().map(|own| product(view(&own.part), view(&block.columns.values))).collect();
+        let parts: Vec<DMatrix<f64>> =
+            components.iter().map(|own| product(view(&own.part), view(&block.columns.values))).collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
         let columns = block.columns.values.ncols();
         let mut values = Vec::with_capacity(rows * columns);
@@ -278,10 +294,8 @@ impl<'f, 'a> Table<'f, 'a> {
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
         order.extend(also.iter().copied().filter(|cell| !order.contains(cell)).collect::<Vec<_>>());
-        let closely: BTreeMap<usize, CellEvidence> = order
-            .into_par_iter()
-            .filter_map(|cell| Some((cell, self.closely(cell, state, components)?)))
-            .collect();
+        let closely: BTreeMap<usize, CellEvidence> =
+            order.into_par_iter().filter_map(|cell| Some((cell, self.closely(cell, state, components)?))).collect();
         for (cell, found) in &closely {
             log_odds[*cell] = prior(*cell) + found.log;
         }
@@ -489,8 +503,7 @@ impl<'f, 'a> Table<'f, 'a> {
         if !scan.best().is_some_and(by_load) {
             return Vec::new();
         }
-        let yields: Vec<usize> =
-            (0..self.cells.len()).filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE).collect();
+        let yields: Vec<usize> = (0..self.cells.len()).filter(|cell| self.cells[*cell].name == names::JOINT_COMPLIANCE).collect();
         let mut components = Vec::new();
         for cell in yields {
             if let Some(mut found) = self.closely(cell, &state, &[]) {

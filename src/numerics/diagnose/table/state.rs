@@ -358,7 +358,8 @@ impl State {
             let (gram, gradient) = self.seen(group, across, first);
             let single = gradient.len() == 1;
             if single {
-                let coefficient = gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE) / block.columns.square[group.range.start].sqrt();
+                let coefficient =
+                    gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE) / block.columns.square[group.range.start].sqrt();
                 let wrong = group.group.positive && coefficient < 0.0;
                 if wrong || coefficient.abs() > 1.5 * group.group.largest {
                     continue;

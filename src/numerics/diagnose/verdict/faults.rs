@@ -1,8 +1,8 @@
 //! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
 use super::last_round::LastRound;
-use crate::criteria::words::FAULT;
 use crate::criteria::screen::{BULK, MISTAKES};
+use crate::criteria::words::FAULT;
 use crate::diagnose::types::{Finding, Probabilities};
 use crate::effect::{Place, names};
 use crate::error::counted;
