@@ -13,6 +13,8 @@ criteria! {
     RARER: f64 = 0.002, "odds", "judgement: a tenth of the common ones", "";
     /// Prior odds of all cells without a name at a place together.
     UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
+    /// Probability of a cause in no list for which these odds are.
+    USUAL: f64 = 0.3, "probability", "judgement: the default of the setting `open_world`", "";
     /// Prior odds of a product without a name, where one of its variables already shows there.
     PRODUCT: f64 = 0.0007, "odds", "judgement: less than a rare cause", "";
     /// Degrees of freedom that the stated noise is worth.

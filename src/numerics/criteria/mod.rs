@@ -19,7 +19,6 @@ pub mod closed_form;
 pub mod effect;
 pub mod judge;
 pub mod noise;
-pub mod open_world;
 pub mod screen;
 pub mod search;
 pub mod setup;
@@ -39,7 +38,6 @@ pub const TABLES: &[&[CriterionRow]] = &[
     effect::ROWS,
     judge::ROWS,
     noise::ROWS,
-    open_world::ROWS,
     screen::ROWS,
     search::ROWS,
     setup::ROWS,
@@ -72,7 +70,6 @@ fn all() -> impl Iterator<Item = (&'static str, &'static dyn criterion::Scalable
         effect::SCALABLE,
         judge::SCALABLE,
         noise::SCALABLE,
-        open_world::SCALABLE,
         screen::SCALABLE,
         search::SCALABLE,
         setup::SCALABLE,

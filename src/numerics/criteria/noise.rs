@@ -40,16 +40,10 @@ criteria! {
     /// A coefficient is hardly ever smaller than this share of the largest that is not of the family: the arm's own lines bend
     /// a little.
     BESIDE: f64 = 0.2, "share", "judgement: lines of an arm", "";
-    /// Cosines of a curve that are all but geometry, which alone carries on beyond the range, and are held down.
-    SLOW: usize = 3, "cosines", "count: less than two periods", "";
-    /// The share to which they are held down.
-    GEOMETRY: f64 = 0.2, "share", "judgement: a fifth of a curve may be slow", "";
     /// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
     ESTIMATES: usize = 3, "estimates", "judgement: bounds time", "";
     /// A repeatability that changes by less than this share is settled.
     SETTLED: f64 = 0.25, "share", "judgement: weights hardly change by less", "";
-    /// Most rounds of search and refit; it settles in two or three.
-    ROUNDS: usize = 6, "rounds", "judgement: bounds time", "";
     /// Rows follow a path where the middle step from row to row is below this share of the middle distance of any two poses.
     NEAR: f64 = 0.35, "share", "judgement: paths have a hundredth, poses at random one", "";
     /// Residuals of so many standard deviations count as gross: they would hide what the others share.

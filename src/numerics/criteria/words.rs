@@ -7,18 +7,8 @@ criteria! {
     "words";
     /// Without repeats a residual is not called noise where it is this many times the instrument's.
     NOT_NOISE: f64 = 4.0, "ratio", "judgement: no tracker is four times worse than stated", "";
-    /// A weak unnamed finding of less than this share of the strongest one's gain is its rest.
-    REST: f64 = 0.03, "share of the gain", "judgement: a shape that is never quite right", "";
-    /// A criterion that is worse by more than this without it makes it a finding all the same.
-    WEAK: f64 = 60.0, "-2 ln of odds", "judgement: beyond that it is seen, however small", "";
     /// What has no name explains nothing where it is more than this share of what was found.
     NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
-    /// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little
-    /// it is confirmed.
-    REJECTED: f64 = 0.8, "probability", "judgement: four to one", "";
-    /// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went
-    /// astray.
-    ASTRAY: f64 = 2.0, "ratio", "judgement: folds of five scatter by less", "";
     /// Orders that a smooth function of an angle may have, too.
     SLOW: u32 = 2, "orders", "count: two periods", "";
     /// Less than this share of a finding's gain at its own joint is its finer shape.
@@ -29,10 +19,6 @@ criteria! {
     CONSTANT: f64 = 0.1, "share", "judgement: a tenth", "";
     /// Causes of a round that are named.
     NAMED: usize = 4, "causes", "judgement: length of a line", "";
-    /// The temperature at which names share what free forms leave.
-    TEMPERATURE: f64 = 2.03, "1", "count: 672 recordings of the list; tests/reference/calibrate_probability.py finds 1.5, hardly better", "changes nothing on 1";
-    /// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
-    IDENTITY: f64 = 6.3, "-2 ln of odds", "count: 672 recordings of the list; tests/reference/calibrate_probability.py finds 2, hardly better", "";
     /// Faults of single rows are seen as such or not at all.
     FAULT: f64 = 0.98, "probability", "count: wrong points among those said, concealed recordings", "";
     /// Standard errors by which a number must be beyond what is possible.

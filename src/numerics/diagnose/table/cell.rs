@@ -67,8 +67,8 @@ pub(super) enum Over {
     Product(Variable),
 }
 
-/// Functions of each of two variables.
-const EACH: usize = 6;
+/// Functions of each of two variables, of motions in one direction, in two, in three.
+const EACH: [usize; 3] = [6, 5, 4];
 /// Steps that are asked at first.
 const STEPS: usize = 24;
 /// A variable of no more values than this bears no curve.
@@ -155,7 +155,9 @@ impl FreeShape {
                 }]
             }
             Over::Product(other) => {
-                let factors = [self.of, other].map(|of| values(of).and_then(|values| factor(&values, closely)));
+                let factors = [self.of, other].map(|of| {
+                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { EACH[2] }))
+                });
                 let [Some(a), Some(b)] = factors else { return Vec::new() };
                 let form = self.term(Law::new(self.of, a).times(other, b));
                 let spectrum = |basis: Basis, length: f64| -> Vec<f64> {
@@ -318,13 +320,13 @@ pub(super) fn line(values: &[f64]) -> Option<Basis> {
 }
 
 /// Functions of one of two variables, a constant among them.
-fn factor(values: &[f64], closely: bool) -> Option<Basis> {
+fn factor(values: &[f64], count: usize) -> Option<Basis> {
     let Basis::Linear { zero, per } = line(values)? else { return None };
     if has_few(values) {
         return Some(Basis::Straight { zero, per });
     }
     let [low, high] = support(values);
-    Some(Basis::Series { low, high, count: if closely { EACH } else { EACH - 2 } })
+    Some(Basis::Series { low, high, count })
 }
 
 /// Whether values are so few that they bear no curve.

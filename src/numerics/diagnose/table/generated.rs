@@ -3,7 +3,7 @@
 
 use super::cell::{Cell, FreeShape, Over, Shapes};
 use super::frame::Frame;
-use crate::criteria::cells::{PRODUCT, UNNAMED};
+use crate::criteria::cells::{PRODUCT, UNNAMED, USUAL};
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use nalgebra::Vector3;
 
@@ -36,8 +36,10 @@ const SLOW: Over = Over::Curve { count: 8, first: 4, lengths: 2 };
 /// Variables of one kind, which share its prior odds.
 type Kind = Vec<(Variable, Over)>;
 
-/// All cells of one variable.
-pub(super) fn cells(survey: &Survey, frame: &mut Frame) -> Vec<Cell> {
+/// All cells of one variable; `open_world` is the probability that what acts somewhere is no cause of the list.
+pub(super) fn cells(survey: &Survey, frame: &mut Frame, open_world: f64) -> Vec<Cell> {
+    let odds = |probability: f64| probability / (1.0 - probability);
+    let unnamed = *UNNAMED * odds(open_world) / odds(*USUAL);
     let mut out = Vec::new();
     let varies = |frame: &Frame, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     for place in places(survey) {
@@ -60,7 +62,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut Frame) -> Vec<Cell> {
         }
         let count = groups.len() as f64;
         for group in groups {
-            let log_prior = (*UNNAMED / count / group.len() as f64).ln();
+            let log_prior = (unnamed / count / group.len() as f64).ln();
             out.extend(group.into_iter().map(|(motion, of, over)| cell(FreeShape { motion, of, over }, log_prior)));
         }
     }

@@ -3,8 +3,9 @@
 
 use super::cell::{Cell, FreeShape, Over, Shape, ShapeGroup, Shapes, not_quite_straight};
 use crate::criteria::cells::{COMMON, RARE, RARER};
+use crate::diagnose::types::Question;
 use crate::effect::{
-    AxisPoint, Basis, CAUSES, DeclaredCause, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, names,
+    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, names,
 };
 use std::collections::BTreeMap;
 
@@ -23,13 +24,14 @@ const OF_MOST_ARMS: [&str; 11] = [
     "tracker_elevation",
 ];
 
-/// Prior odds of a cell of a cause.
-fn odds(name: &str) -> f64 {
-    match name {
+/// ln of the prior odds of a cell of a cause; `weight` is by what rarity is multiplied.
+fn log_prior(name: &str, weight: f64) -> f64 {
+    let odds = match name {
         names::CABLE_DRAG => *RARER,
         name if OF_MOST_ARMS.contains(&name) => *COMMON,
         _ => *RARE,
-    }
+    };
+    COMMON.ln() + weight * (odds / *COMMON).ln()
 }
 
 /// The cause under whose name a form is a cell: a joint yields to its load in one way, in proportion or not.
@@ -37,13 +39,9 @@ pub(super) fn cell_of(cause: &'static str) -> &'static str {
     if cause == names::JOINT_HARDENING { names::JOINT_COMPLIANCE } else { cause }
 }
 
-/// All cells with a name; those of `without` keep their shapes and lose the name.
-pub(super) fn cells(
-    survey: &Survey,
-    values: &dyn Fn(Variable) -> Option<Vec<f64>>,
-    without: &[String],
-    declared: &[&'static DeclaredCause],
-) -> Vec<Cell> {
+/// All cells with a name; those that are to be left out keep their shapes and lose the name.
+pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, question: &Question) -> Vec<Cell> {
+    let Question { without, own: declared, prior_weight, .. } = *question;
     let mut all: BTreeMap<(&'static str, Place), Vec<Hypothesis>> = BTreeMap::new();
     // What is a cell of its own without a name, or no cell at all.
     let other = [names::UNKNOWN, names::JOINT_TABLE, names::OUTLIER, names::MISLABELLED_POINT];
@@ -64,7 +62,13 @@ pub(super) fn cells(
         let mut groups = weighed(hypotheses);
         groups.extend(curves(name, place, &groups, values, survey.joints()));
         let told = if without.iter().any(|out| out == name) { names::UNKNOWN } else { name };
-        Cell { name: told, place, key: format!("{name}@{place}"), log_prior: odds(name).ln(), shapes: Shapes::Listed(groups) }
+        Cell {
+            name: told,
+            place,
+            key: format!("{name}@{place}"),
+            log_prior: log_prior(name, prior_weight),
+            shapes: Shapes::Listed(groups),
+        }
     };
     all.into_iter().map(cell).collect()
 }

@@ -67,7 +67,7 @@ impl Rounds {
             !(fitter.causes_of_the_arm_first()
                 && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
         };
-        let mut table = Table::new(&mut frame, &survey, question.without, question.own, &self.shown, keeps);
+        let mut table = Table::new(&mut frame, &survey, question, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         let mut components = Vec::new();

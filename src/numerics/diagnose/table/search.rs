@@ -6,7 +6,8 @@ use super::frame::{Frame, product, view};
 use super::state::{Block, Component, PartProducts, State};
 use super::{generated, listed};
 use crate::criteria::cells::{BENDS, CLOSELY, COMPONENTS, JOINS, LEAVES, NU, SECOND_ORDER, SWAPS, TRACE};
-use crate::effect::{Basis, DeclaredCause, Form, Survey, Variable, names};
+use crate::diagnose::types::Question;
+use crate::effect::{Basis, Form, Survey, Variable, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -74,15 +75,14 @@ impl<'f, 'a> Table<'f, 'a> {
     pub fn new(
         frame: &'f mut Frame<'a>,
         survey: &'f Survey<'f>,
-        without: &[String],
-        declared: &[&'static DeclaredCause],
+        question: &Question,
         shown: &[FreeShape],
         keeps: impl Fn(&Cell) -> bool,
     ) -> Self {
-        let mut cells = generated::cells(survey, frame);
+        let mut cells = generated::cells(survey, frame, question.open_world);
         cells.extend(generated::products(shown, survey, frame));
         let values = |of: Variable| frame.values(of);
-        let mut named = listed::cells(survey, &values, without, declared);
+        let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
         named.retain(keeps);
         let mut motions = Vec::new();
@@ -532,6 +532,11 @@ impl<'f, 'a> Table<'f, 'a> {
             // What was unlikely before is asked again when the likely ones are used up.
             likely = scan.order.iter().copied().take(LIKELY).collect();
             let Some(best) = scan.best() else { break };
+            let numbers: usize = components.iter().map(|own| own.part.ncols()).sum();
+            // So many numbers describe rows and explain nothing.
+            if 3.0 * numbers as f64 > state.rows.freedom {
+                break;
+            }
             if scan.log_odds[best] < price {
                 break;
             }
