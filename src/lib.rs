@@ -25,7 +25,7 @@
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
-//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | diagnose, effect, estimate, spatial |
+//! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, estimate, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
 //! | [`diff`] | two tables or two runs compared | raw, store |
@@ -34,7 +34,7 @@
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, dynamics, effect, estimate, identified, robot, table, yaml |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, robot, table, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |

@@ -38,14 +38,6 @@ fn no_diagnosis_and_no_cause_names_a_cause_by_a_string() {
 }
 
 #[test]
-fn findings_are_merged_by_what_causes_say_of_each_other() {
-    let (_, text) = code("diagnose").into_iter().find(|(file, _)| file == "diagnose/finding_groups.rs").expect("the file");
-    let others: Vec<&str> =
-        text.match_indices("names::").map(|(at, _)| &text[at..]).filter(|rest| !rest.starts_with("names::UNKNOWN")).collect();
-    assert!(others.is_empty(), "finding_groups.rs names a cause");
-}
-
-#[test]
 fn a_string_that_names_a_cause_is_seen() {
     assert_eq!(
         named("let a = \"backlash\";\n    name: \"backlash\",\n// \"backlash\"\nlet b = \"backlashes\";"),

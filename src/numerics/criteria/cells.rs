@@ -61,4 +61,34 @@ criteria! {
     FAR: f64 = 4.0, "standard deviations", "count: one in a thousand rows of normal noise", "";
     /// Ratio of the largest to the smallest variance of the noise by direction above which its shape is estimated.
     UNEVEN: f64 = 1.8, "ratio of variances", "count: the scatter of variances of a hundred rows", "";
+    /// Rows of even noise that a shape of the noise has to speak against.
+    EVEN: f64 = 10.0, "rows", "judgement: a shape by few rows is scatter", "";
+    /// Functions of each of two variables in a product, of motions in one direction, in two, in three.
+    EACH: [usize; 3] = [6, 5, 4], "functions", "judgement: bounds time", "";
+    /// Cosines of what is not straight in a law that is nearly a line.
+    BENDING: usize = 12, "cosines", "count: bends over a twelfth of the range", "";
+    /// Steps in time of a motion without a name that are asked at first.
+    STEPS: usize = 24, "steps", "judgement: bounds time; the best cells are asked at every time", "";
+    /// A variable of no more values than this bears no curve.
+    FEW: usize = 3, "values", "count: three values", "";
+    /// Limits at which what sticks beside a joint slips.
+    LIMITS: [f64; 3] = [0.07, 0.14, 0.28], "share of the joint's travel", "count: twofold", "";
+    /// Times in which a move fades.
+    FADING: [f64; 3] = [15.0, 35.0, 80.0], "s", "judgement: between two readings and some minutes", "";
+    /// ln of the odds, below the best, from which a cell is not asked.
+    FAR_BELOW: f64 = 12.0, "ln of odds", "count: 1 in 160,000", "";
+    /// ln of the odds below which no cell is asked.
+    UNLIKELY: f64 = -8.0, "ln of odds", "count: 1 in 3,000", "";
+    /// Cells that are asked first when one has joined.
+    LIKELY: usize = 240, "cells", "judgement: bounds time; all are asked before the search ends", "";
+    /// Share of a component's motion that a cell must be able to make to be asked in its place.
+    ALIKE: f64 = 0.2, "share", "judgement: less explains something else", "";
+    /// Share of two components' covariances in common above which one is estimated anew when the other joins.
+    COUPLED: f64 = 0.01, "share", "judgement: bounds time", "";
+    /// How often a step of a shape's number is halved.
+    LEVELS: i32 = 5, "levels", "judgement: bounds time", "";
+    /// Exchanges of a search at most.
+    EXCHANGES: usize = 8, "exchanges", "judgement: bounds time", "";
+    /// Waves that may stand in for a free curve of a joint's own angle.
+    WAVES: usize = 3, "waves", "judgement: gears have few strong orders", "";
 }

@@ -38,7 +38,7 @@ pub use verdict::other_means;
 use crate::criteria::cells::SETTLED;
 use crate::criteria::search::FEWEST;
 use round::{FitState, Fitter, RoundView, correlation_left_by};
-use table::{Answer, FoundCause, Rounds};
+use table::{Answer, FoundCell, Rounds};
 use verdict::{LastRound, conclude};
 
 /// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
@@ -87,7 +87,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
 
 /// The model without findings that are smaller than their own uncertainty in the whole model: the search saw a linear picture of each.
 fn without_empty(state: FitState, mut answer: Answer, fitter: &Fitter) -> (FitState, Answer) {
-    let is_empty = |found: &FoundCause| state.square_size(&found.members).is_some_and(|size| size < 1.0);
+    let is_empty = |found: &FoundCell| state.square_size(&found.members).is_some_and(|size| size < 1.0);
     let gone: Vec<usize> = answer.found.iter().filter(|found| is_empty(found)).flat_map(|found| found.members.clone()).collect();
     if gone.is_empty() || state.screening.apart.is_some() {
         return (state, answer);

@@ -15,7 +15,7 @@ use crate::criteria::torque::NAMED;
 const ROUNDS: usize = 40;
 
 /// What becomes of a form.
-enum Unnamed {
+enum NotNamed {
     /// At a position of the set: it leaves.
     Out(usize),
     /// It stays in the model without a name.
@@ -30,8 +30,8 @@ pub(super) fn take_out_ends(problem: &mut TorqueProblem, weighted: &mut Weighted
     while let Some(one) = at_end(problem, set) {
         changed = true;
         match one {
-            Unnamed::Within(place, form) => set[place] = push(problem, weighted, form),
-            Unnamed::Out(place) | Unnamed::Silent(place) => {
+            NotNamed::Within(place, form) => set[place] = push(problem, weighted, form),
+            NotNamed::Out(place) | NotNamed::Silent(place) => {
                 let form = &problem.all.forms[set.remove(place)];
                 problem.barred.push((form.cause.name(), form.place));
             }
@@ -41,13 +41,13 @@ pub(super) fn take_out_ends(problem: &mut TorqueProblem, weighted: &mut Weighted
 }
 
 /// The first form of a set with a number at an end.
-fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<Unnamed> {
+fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
     set.iter().enumerate().find_map(|(place, number)| {
         let form = &problem.all.forms[*number];
         match form.within_ends() {
             _ if form.cause.name() == UNKNOWN => None,
-            None => Some(Unnamed::Out(place)),
-            Some(within) => (within.shape != form.shape).then_some(Unnamed::Within(place, within)),
+            None => Some(NotNamed::Out(place)),
+            Some(within) => (within.shape != form.shape).then_some(NotNamed::Within(place, within)),
         }
     })
 }
@@ -64,12 +64,12 @@ pub(super) fn settle_names(
         let next = at_end(problem, &judged.set).or_else(|| next(&CauseChoice::new(problem, weighted, seed), judged, &slopes));
         match next {
             None => return slopes,
-            Some(Unnamed::Silent(place)) => {
+            Some(NotNamed::Silent(place)) => {
                 judged.silent.push(judged.set[place]);
                 continue;
             }
-            Some(Unnamed::Out(place)) => _ = judged.set.remove(place),
-            Some(Unnamed::Within(place, form)) => judged.set[place] = push(problem, weighted, form),
+            Some(NotNamed::Out(place)) => _ = judged.set.remove(place),
+            Some(NotNamed::Within(place, form)) => judged.set[place] = push(problem, weighted, form),
         }
         polish(problem, weighted, &mut judged.set);
     }
@@ -85,7 +85,7 @@ fn push(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, form: Torqu
 }
 
 /// The form with the least right to its name.
-fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Option<Unnamed> {
+fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Option<NotNamed> {
     let (all, set) = (&choice.problem.all, &judged.set);
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
@@ -115,8 +115,8 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let mut leaning = (0..set.len()).filter(|other| modifies(choice.form(set[*other]), form));
     let is_summed = choice.is_part_of_curve(form, |other| set.contains(&other));
     if is_summed || (form.cause.about().brakes && sure > 0.0) {
-        return Some(Unnamed::Silent(place));
+        return Some(NotNamed::Silent(place));
     }
     // What leans on friction that is none is none either.
-    Some(Unnamed::Out(leaning.next().unwrap_or(place)))
+    Some(NotNamed::Out(leaning.next().unwrap_or(place)))
 }

@@ -1,7 +1,7 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::placed;
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -26,7 +26,7 @@ const DEEPEST: f64 = 3.0;
 
 impl Cause for BaseCompliance {
     about! {
-        name: "base_compliance",
+        name: names::BASE_COMPLIANCE,
         place: "base",
         formula: "the base tilts about its origin, or a point below, by the moment on it",
         size: "0.01 to 1 urad/Nm",

@@ -1,7 +1,9 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
 use super::motion::{SHORT, extent};
-use super::{Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, warmth};
+use super::{
+    Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names, warmth,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -22,7 +24,7 @@ pub(super) const MEASURE: Measure =
 
 impl Cause for ThermalGrowth {
     about! {
-        name: "thermal_growth",
+        name: names::THERMAL_GROWTH,
         place: "link, or neighbouring links",
         formula: "lengths grow by c (T - T0), or c (1 - exp(-time / tau))",
         size: "10 to 25 um/m for each kelvin",

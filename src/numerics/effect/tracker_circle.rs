@@ -1,6 +1,6 @@
 //! `tracker_circle`: the horizontal circle of the instrument sits off its axis, or is out of round: azimuths err once or twice a turn.
 
-use super::{Cause, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, orders};
+use super::{Cause, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, names, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -15,7 +15,7 @@ pub(super) const MEASURE: Measure = Measure { rank: 2, advice: "measure fixed po
 
 impl Cause for TrackerCircle {
     about! {
-        name: "tracker_circle",
+        name: names::TRACKER_CIRCLE,
         place: "tracker",
         formula: "azimuth errs by a sin(n az) + b cos(n az), n = 1, 2",
         size: "0.5 to 5 arcsec",

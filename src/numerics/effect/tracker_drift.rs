@@ -1,7 +1,9 @@
 //! `tracker_drift`: the tracker's frame moves slowly: steadily, with the warm-up, or as a slow curve in time.
 
 use super::basis::around;
-use super::{Axes, Basis, Cause, Clock, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, warmth};
+use super::{
+    Axes, Basis, Cause, Clock, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, names, warmth,
+};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 
@@ -14,7 +16,7 @@ const SLOW: usize = 3;
 
 impl Cause for TrackerDrift {
     about! {
-        name: "tracker_drift",
+        name: names::TRACKER_DRIFT,
         place: "tracker",
         formula: "the tracker's frame moves steadily, with the warm-up, or slowly",
         size: "10 to 200 um",

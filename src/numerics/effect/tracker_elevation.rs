@@ -3,7 +3,7 @@
 
 use super::summary::amplitude;
 use super::tracker_circle::MEASURE;
-use super::{Cause, Hypothesis, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, orders};
+use super::{Cause, Hypothesis, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, about, names, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -16,7 +16,7 @@ const WAYS: [(Polar, u32); 3] = [(Polar::Elevation, 1), (Polar::Elevation, 2), (
 
 impl Cause for TrackerElevation {
     about! {
-        name: "tracker_elevation",
+        name: names::TRACKER_ELEVATION,
         place: "tracker",
         formula: "elevation or azimuth errs by a sin(n el) + b cos(n el), n = 1, 2",
         size: "0.5 to 5 arcsec",

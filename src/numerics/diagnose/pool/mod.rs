@@ -6,7 +6,6 @@ mod beside;
 mod cholesky;
 mod hypotheses;
 mod linear;
-mod solve;
 
 pub(crate) use beside::Beside;
 pub(crate) use hypotheses::HypothesisSet;

@@ -1,11 +1,12 @@
 //! What a search has found, as findings: which components make one up, how probable its name and its place are, what else it may be; and where
 //! the residual sits before and after.
 
-use super::cell::Cell;
+use super::cell::CauseCell;
 use super::evidence::log_sum;
 use super::listed::cell_of;
-use super::search::{Scan, Table, without};
-use super::state::{Block, Component, State};
+use super::scan::{CauseTable, CellScan};
+use super::search::without;
+use super::state::{CellColumns, Component, KnownState};
 use crate::criteria::cells::{MISLED, RIVAL};
 use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 
 /// One finding of a search.
 #[derive(Clone)]
-pub(crate) struct FoundCause {
+pub(crate) struct FoundCell {
     pub effect: &'static str,
     pub place: Place,
     /// Positions of its forms among the causes of the model.
@@ -31,7 +32,7 @@ pub(crate) struct FoundCause {
 
 /// What the table says of the last model.
 pub(crate) struct Answer {
-    pub found: Vec<FoundCause>,
+    pub found: Vec<FoundCell>,
     /// Probability that no further cell is there, at the start and at the end.
     pub nothing_first: f64,
     pub nothing_last: f64,
@@ -44,12 +45,12 @@ pub(crate) struct Answer {
 }
 
 /// The name of a component.
-fn told(own: &Component, cell: &Cell) -> &'static str {
+fn told(own: &Component, cell: &CauseCell) -> &'static str {
     let bends = cell.name == names::JOINT_COMPLIANCE && own.shape.is_bent;
     if bends { names::JOINT_HARDENING } else { cell.name }
 }
 
-impl Table<'_, '_> {
+impl CauseTable<'_, '_> {
     /// The findings that components are; `first` is where the residual sat before any of them.
     pub(super) fn answer(&mut self, components: &[Component], first: (Located, f64)) -> Answer {
         self.know(components);
@@ -90,13 +91,13 @@ impl Table<'_, '_> {
     }
 
     /// The finding of some components: names and places beside all others, at a noise.
-    fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCause {
+    fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCell {
         let others = without(components, members);
         let rest: Vec<&Component> = others.iter().collect();
         let state = self.state(&rest, Some(kappa));
         let with = self.state(&components.iter().collect::<Vec<_>>(), Some(kappa));
         // The strongest of several stands for its finding; further ones of its cell add to it.
-        let log_of = |i: usize, state: &State, rest: &[&Component]| self.log_evidence(&components[i], state, rest);
+        let log_of = |i: usize, state: &KnownState, rest: &[&Component]| self.log_evidence(&components[i], state, rest);
         let strongest = members.iter().copied().max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
@@ -116,7 +117,7 @@ impl Table<'_, '_> {
         for i in members {
             bounds.extend(components[*i].forms.iter().map(|_| (components[*i].group.positive, components[*i].group.largest)));
         }
-        FoundCause {
+        FoundCell {
             effect,
             place,
             members: Vec::new(),
@@ -135,7 +136,7 @@ impl Table<'_, '_> {
         (effect, place): (&'static str, Place),
         own: usize,
         component: &Component,
-        scan: &Scan,
+        scan: &CellScan,
     ) -> (Probabilities, Vec<RivalCause>) {
         let whole = log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>());
         let mut shares: BTreeMap<(&'static str, Place), f64> = BTreeMap::new();
@@ -144,7 +145,7 @@ impl Table<'_, '_> {
             if probability < 1e-6 {
                 continue;
             }
-            let bends = |found: &super::search::CellEvidence| (found.bent - found.log).exp().clamp(0.0, 1.0);
+            let bends = |found: &super::scan::CellEvidence| (found.bent - found.log).exp().clamp(0.0, 1.0);
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
             let bent = if k == own && component.shape.is_bent { bent.max(0.9) } else { bent };
@@ -172,7 +173,7 @@ impl Table<'_, '_> {
     }
 
     /// What each place, variable and order could explain of what a state leaves.
-    pub(super) fn locate(&self, state: &State) -> Located {
+    pub(super) fn locate(&self, state: &KnownState) -> Located {
         let mut best: BTreeMap<(&'static str, String), ExplainedShare> = BTreeMap::new();
         let mut lines: BTreeMap<(usize, bool, u32), f64> = BTreeMap::new();
         let clock = Clock::of(self.survey.data);
@@ -214,7 +215,7 @@ impl Table<'_, '_> {
     }
 
     /// Standard errors of forms that geometry may hide.
-    fn hidden(&self, state: &State, components: &[&Component]) -> Vec<(Form, f64)> {
+    fn hidden(&self, state: &KnownState, components: &[&Component]) -> Vec<(Form, f64)> {
         let mut out = Vec::new();
         for cell in self.cells.iter().filter(|cell| cell.is_named()) {
             let super::cell::Shapes::Listed(groups) = &cell.shapes else { continue };
@@ -224,7 +225,7 @@ impl Table<'_, '_> {
                 {
                     continue;
                 }
-                let block = Block::of(vec![group.clone()], self.frame);
+                let block = CellColumns::of(vec![group.clone()], self.frame);
                 let across = self.across_block(&block, state, components);
                 out.extend(state.errors(&block, &across).first().map(|error| (form.clone(), *error)));
             }
@@ -234,7 +235,7 @@ impl Table<'_, '_> {
 }
 
 /// Probability that nothing more is there.
-pub(super) fn nothing(scan: &Scan) -> f64 {
+pub(super) fn nothing(scan: &CellScan) -> f64 {
     (-log_sum(&scan.log_odds.iter().copied().chain([0.0]).collect::<Vec<_>>())).exp()
 }
 

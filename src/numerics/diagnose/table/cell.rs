@@ -1,11 +1,11 @@
 //! Cells: a cause at a place in every shape that it may have, or a motion of a place over a variable that no cause of the list has.
 
-use crate::criteria::cells::{BENT, LENGTHS, MARGIN};
+use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, STEPS};
 use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Term, Unknown, Variable, names};
 use std::f64::consts::PI;
 
 /// A cause at a place, whatever its shape.
-pub(super) struct Cell {
+pub(super) struct CauseCell {
     /// Canonical name of the cause, `unknown` of a cell without a name.
     pub name: &'static str,
     pub place: Place,
@@ -28,7 +28,7 @@ pub(super) enum Shapes {
 #[derive(Clone)]
 pub(super) struct ShapeGroup {
     pub forms: Vec<Form>,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<CellShape>,
     /// Whether coefficients are positive.
     pub positive: bool,
     /// The largest coefficient that makes sense, SI.
@@ -37,7 +37,7 @@ pub(super) struct ShapeGroup {
 
 /// A shape: how the prior variance is shared among the columns of a group.
 #[derive(Clone)]
-pub(super) struct Shape {
+pub(super) struct CellShape {
     /// One for each column; their sum is 1. Empty: alike.
     pub shares: Vec<f64>,
     /// ln of the weight of the shape within its cell.
@@ -67,14 +67,7 @@ pub(super) enum Over {
     Product(Variable),
 }
 
-/// Functions of each of two variables, of motions in one direction, in two, in three.
-const EACH: [usize; 3] = [6, 5, 4];
-/// Steps that are asked at first.
-const STEPS: usize = 24;
-/// A variable of no more values than this bears no curve.
-const FEW: usize = 3;
-
-impl Cell {
+impl CauseCell {
     /// Its groups of shapes; all of them if `closely`.
     pub fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
         match &self.shapes {
@@ -100,7 +93,7 @@ impl Cell {
 impl ShapeGroup {
     /// A single form, all of its columns alike.
     pub fn of(form: Form, log_weight: f64) -> Self {
-        let shape = Shape { shares: Vec::new(), log_weight, is_bent: false };
+        let shape = CellShape { shares: Vec::new(), log_weight, is_bent: false };
         Self { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }
     }
 }
@@ -114,7 +107,7 @@ impl FreeShape {
     pub fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
         let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of)) else { return Vec::new() };
         let [low, high] = support(&values);
-        let shape = |shares| Shape { shares, log_weight: 0.0, is_bent: false };
+        let shape = |shares| CellShape { shares, log_weight: 0.0, is_bent: false };
         vec![ShapeGroup {
             forms: vec![self.term(Law::new(self.of, Basis::Cosines { low, high, count }))],
             shapes: matern(count, lengths, self.motion).into_iter().map(shape).collect(),
@@ -127,7 +120,7 @@ impl FreeShape {
         let fields = fields(self.motion);
         match self.over {
             Over::Step => {
-                let times: Vec<f64> = if closely { survey.boundaries.clone() } else { survey.changes(STEPS).collect() };
+                let times: Vec<f64> = if closely { survey.boundaries.clone() } else { survey.changes(*STEPS).collect() };
                 let log_weight = -(times.len().max(1) as f64).ln();
                 let form = |at| self.term(Law::new(self.of, Basis::After { at }));
                 times.into_iter().map(|at| ShapeGroup::of(form(at), log_weight)).collect()
@@ -176,7 +169,7 @@ impl FreeShape {
                     shares[0] = 0.0;
                     let sum: f64 = shares.iter().sum();
                     let shares = shares.into_iter().map(|share| share / sum).collect();
-                    Shape { shares: over_fields(shares, self.motion, fields), log_weight: -2.0_f64.ln(), is_bent: false }
+                    CellShape { shares: over_fields(shares, self.motion, fields), log_weight: -2.0_f64.ln(), is_bent: false }
                 };
                 let shapes = [1.0, 0.35].map(shape).to_vec();
                 vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]
@@ -216,40 +209,39 @@ pub(super) fn not_quite_straight(
     values: &[f64],
     log_weight: f64,
 ) -> Option<ShapeGroup> {
-    const COUNT: usize = 12;
     if has_few(values) {
         return None;
     }
     let [low, high] = support(values);
-    let curve = Term::new(&Unknown, motion, Law::new(of, Basis::Cosines { low, high, count: COUNT }));
+    let curve = Term::new(&Unknown, motion, Law::new(of, Basis::Cosines { low, high, count: *BENDING }));
     let fields = fields(motion);
     let mut shapes = Vec::new();
-    for curve in matern(COUNT, 3, motion) {
+    for curve in matern(*BENDING, 3, motion) {
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (fields as f64 * all), fields);
             let shares = line.chain(curve.iter().map(|own| own * share * share / all)).collect();
-            shapes.push(Shape { shares, log_weight: log_weight - 6.0_f64.ln(), is_bent: true });
+            shapes.push(CellShape { shares, log_weight: log_weight - 6.0_f64.ln(), is_bent: true });
         }
     }
     Some(ShapeGroup { forms: vec![line, curve.into()], shapes, positive: false, largest: f64::INFINITY })
 }
 
 /// A line, curves of some correlation lengths, and lines that are not quite straight.
-fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool) -> Vec<Shape> {
+fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool) -> Vec<CellShape> {
     let curve = lengths[0].len();
     let half = 0.5_f64.ln();
     let straight = std::iter::repeat_n(1.0 / line as f64, line).chain(std::iter::repeat_n(0.0, curve)).collect();
-    let mut out = vec![Shape { shares: straight, log_weight: half, is_bent: false }];
+    let mut out = vec![CellShape { shares: straight, log_weight: half, is_bent: false }];
     let count = (lengths.len() as f64).ln();
     for own in lengths {
         let alone = std::iter::repeat_n(0.0, line).chain(own.iter().copied()).collect();
-        out.push(Shape { shares: alone, log_weight: half - count, is_bent: false });
+        out.push(CellShape { shares: alone, log_weight: half - count, is_bent: false });
         for share in *BENT {
             let all = 1.0 + share * share;
             let line = std::iter::repeat_n(1.0 / (line as f64 * all), line);
             let shares = line.chain(own.iter().map(|own| own * share * share / all)).collect();
-            out.push(Shape { shares, log_weight: half - count - 2.0_f64.ln(), is_bent: true });
+            out.push(CellShape { shares, log_weight: half - count - 2.0_f64.ln(), is_bent: true });
         }
     }
     if rough {
@@ -259,7 +251,7 @@ fn line_and_curve(line: usize, motion: Motion, lengths: &[Vec<f64>], rough: bool
         let sum: f64 = all.iter().sum();
         let all = over_fields(all.into_iter().map(|share| share / sum).collect(), motion, line);
         let shares = std::iter::repeat_n(0.0, line).chain(all).collect();
-        out.push(Shape { shares, log_weight: half - count, is_bent: false });
+        out.push(CellShape { shares, log_weight: half - count, is_bent: false });
     }
     out
 }
@@ -337,7 +329,7 @@ pub(super) fn has_few(values: &[f64]) -> bool {
         if !distinct.iter().any(|other| (other - value).abs() < 1e-9 * (high - low)) {
             distinct.push(*value);
         }
-        if distinct.len() > FEW {
+        if distinct.len() > *FEW {
             return false;
         }
     }

@@ -14,7 +14,7 @@ pub(super) const AMPLITUDES: usize = 28;
 
 /// How much the rows say: degrees of freedom and the squared residual, in standard deviations of the noise.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rows {
+pub(super) struct EvidenceRows {
     pub freedom: f64,
     pub square: f64,
 }
@@ -37,7 +37,7 @@ impl GroupEvidence {
 
 /// The evidence of columns by their Gram matrix, their products with the residual (both in standard deviations of the noise), and the
 /// shares of the prior variance.
-pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: Rows) -> GroupEvidence {
+pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: EvidenceRows) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
     let scaled;
     let (diagonal, beside, along) = if let [k] = kept[..] {
@@ -139,7 +139,7 @@ fn log_mean(logs: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    const ROWS: Rows = Rows { freedom: 300.0, square: 320.0 };
+    const ROWS: EvidenceRows = EvidenceRows { freedom: 300.0, square: 320.0 };
 
     #[test]
     fn one_column_has_the_evidence_of_its_integral() {
@@ -157,12 +157,12 @@ mod tests {
 
     #[test]
     fn the_evidence_of_columns_that_are_not_orthogonal_is_that_of_their_covariance() {
-        // Columns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
+        // UnitColumns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
         let entry = |i: usize, j: usize| (((5 * i + 3 * j * j + 2 * i * j) % 11) as f64 - 5.0) * 300.0;
         let columns = DMatrix::from_fn(9, 5, entry);
         let residual = DVector::from_fn(9, |i, _| ((7 * i) % 5) as f64 - 1.5);
         let shares = [0.1, 0.2, 0.05, 0.4, 0.25];
-        let rows = Rows { freedom: 9.0, square: residual.norm_squared() };
+        let rows = EvidenceRows { freedom: 9.0, square: residual.norm_squared() };
         let found = evidence(&columns.tr_mul(&columns), &columns.tr_mul(&residual), &shares, rows);
         let at = |amplitude: f64| {
             let prior = DMatrix::from_diagonal(&DVector::from_row_slice(&shares)) * (amplitude * amplitude);

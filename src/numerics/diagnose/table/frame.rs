@@ -1,8 +1,8 @@
 //! The rows as they stand around the present model: what is left without any cell, and the columns of whatever moves it; both weighed, with
 //! geometry projected off.
 
-use super::evidence::Rows;
-use crate::criteria::cells::{FAR, UNEVEN};
+use super::evidence::EvidenceRows;
+use crate::criteria::cells::{EVEN, FAR, UNEVEN};
 use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Form, Law, Motion, Variable};
@@ -23,8 +23,8 @@ pub(super) struct NoiseShape {
     currents: Option<f64>,
 }
 
-/// Columns of unit rms motion at the tool.
-pub(super) struct Columns {
+/// UnitColumns of unit rms motion at the tool.
+pub(super) struct UnitColumns {
     /// Residual rows x columns.
     pub values: DMatrix<f64>,
     /// Mean squared motion (m2 or rad2) by a unit of each coefficient.
@@ -32,7 +32,7 @@ pub(super) struct Columns {
 }
 
 /// The rows of the recording around a model.
-pub(super) struct Frame<'a> {
+pub(super) struct SearchRows<'a> {
     pub view: &'a RoundView<'a>,
     base: Mat<f64>,
     residual: Vec<f64>,
@@ -43,7 +43,7 @@ pub(super) struct Frame<'a> {
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
-impl<'a> Frame<'a> {
+impl<'a> SearchRows<'a> {
     /// Around a fitted model; the residual is that without its causes.
     pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter, noise: NoiseShape) -> Self {
         let problem = &view.problem;
@@ -74,10 +74,10 @@ impl<'a> Frame<'a> {
     }
 
     /// What is left, and how many rows say something of their own.
-    pub fn rows(&self) -> Rows {
+    pub fn rows(&self) -> EvidenceRows {
         let square = self.residual.iter().map(|value| value * value).sum();
         let counted = self.residual.len() as f64 / self.view.autocorrelation_time();
-        Rows { freedom: (counted - self.base.ncols() as f64).max(1.0), square }
+        EvidenceRows { freedom: (counted - self.base.ncols() as f64).max(1.0), square }
     }
 
     /// The least variance of the noise over what is stated: what motor currents leave says nothing of the points'.
@@ -114,8 +114,8 @@ impl<'a> Frame<'a> {
         self.values.par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
     }
 
-    /// Columns of some forms, one form after another, and how many each has.
-    pub fn columns(&self, forms: &[Form]) -> (Columns, Vec<usize>) {
+    /// UnitColumns of some forms, one form after another, and how many each has.
+    pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
         let (rows, problem) = (self.residual.len(), &self.view.problem);
         let mut raw = Vec::new();
         let mut counts = Vec::with_capacity(forms.len());
@@ -135,10 +135,10 @@ impl<'a> Frame<'a> {
             column.iter_mut().for_each(|value| *value *= scale);
         }
         project(self.base.as_ref(), &mut raw);
-        (Columns { values: DMatrix::from_vec(rows, raw.len() / rows.max(1), raw), square }, counts)
+        (UnitColumns { values: DMatrix::from_vec(rows, raw.len() / rows.max(1), raw), square }, counts)
     }
 
-    /// Columns of a law at a place from the motion's directions and the law's functions.
+    /// UnitColumns of a law at a place from the motion's directions and the law's functions.
     fn of_term(&self, form: &Form) -> Option<Vec<f64>> {
         let term = form.term()?;
         let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
@@ -250,13 +250,11 @@ impl NoiseShape {
 
 /// What makes a noise of this summed covariance even and leaves its strength; none where it is nearly even.
 fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
-    // Ten rows of even noise.
-    const EVEN: f64 = 10.0;
-    if count < EVEN {
+    if count < *EVEN {
         return None;
     }
     let even = sum.trace() / (3.0 * count);
-    let covariance = (sum + Matrix3::identity() * (EVEN * even)) / (count + EVEN);
+    let covariance = (sum + Matrix3::identity() * (*EVEN * even)) / (count + *EVEN);
     let parts = covariance.symmetric_eigen();
     let (least, most) = (parts.eigenvalues.min(), parts.eigenvalues.max());
     if least <= 0.0 || most / least < *UNEVEN {

@@ -1,9 +1,10 @@
 //! The cells without a name: every motion of every place over every variable of the recording, less what a named cell is; and products of
 //! two variables where one of them shows. What is left out here would take the name of a neighbour.
 
-use super::cell::{Cell, FreeShape, Over, Shapes};
-use super::frame::Frame;
-use crate::criteria::cells::{PRODUCT, UNNAMED, USUAL};
+use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::frame::SearchRows;
+use crate::criteria::cells::{FADING, LIMITS, PRODUCT, UNNAMED, USUAL};
+use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use nalgebra::Vector3;
 
@@ -23,9 +24,6 @@ const ARROWS: [[i8; 3]; 13] = [
     [1, -1, 1],
     [-1, 1, 1],
 ];
-/// Limits at which what sticks beside a joint slips, as shares of its travel; times (s) in which a move fades.
-const LIMITS: [f64; 3] = [0.07, 0.14, 0.28];
-const FADING: [f64; 3] = [15.0, 35.0, 80.0];
 /// Shorter links (m) are no place of their own.
 const SHORT: f64 = 1e-3;
 
@@ -36,12 +34,13 @@ const SLOW: Over = Over::Curve { count: 8, first: 4, lengths: 2 };
 /// Variables of one kind, which share its prior odds.
 type Kind = Vec<(Variable, Over)>;
 
-/// All cells of one variable; `open_world` is the probability that what acts somewhere is no cause of the list.
-pub(super) fn cells(survey: &Survey, frame: &mut Frame, open_world: f64) -> Vec<Cell> {
+/// All cells of one variable.
+pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question) -> Vec<CauseCell> {
     let odds = |probability: f64| probability / (1.0 - probability);
-    let unnamed = *UNNAMED * odds(open_world) / odds(*USUAL);
+    let unnamed = *UNNAMED * odds(question.open_world) / odds(*USUAL);
+    let left_out = |name: &str| question.without.iter().any(|out| out == name);
     let mut out = Vec::new();
-    let varies = |frame: &Frame, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
+    let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     for place in places(survey) {
         let families = families(place, survey);
         let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();
@@ -53,7 +52,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut Frame, open_world: f64) -> Vec<
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
                     .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
-                    .filter(|(motion, of, over)| !is_listed(*motion, *of, *over))
+                    .filter(|(motion, of, over)| listed_as(*motion, *of, *over).is_none_or(left_out))
                     .collect();
                 if !all.is_empty() {
                     groups.push(all);
@@ -70,8 +69,8 @@ pub(super) fn cells(survey: &Survey, frame: &mut Frame, open_world: f64) -> Vec<
 }
 
 /// Products of a motion's variable that shows with every other one that it may follow.
-pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut Frame) -> Vec<Cell> {
-    let mut out: Vec<Cell> = Vec::new();
+pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchRows) -> Vec<CauseCell> {
+    let mut out: Vec<CauseCell> = Vec::new();
     for FreeShape { motion, of, .. } in shown {
         let kinds = kinds(motion.place(), *motion, survey);
         let single = kinds.into_iter().filter(|kind| kind.len() < survey.joints() + 2).flatten();
@@ -98,10 +97,10 @@ fn is_alike(a: Variable, b: Variable) -> bool {
     a.to_string() == b.to_string()
 }
 
-fn cell(free: FreeShape, log_prior: f64) -> Cell {
+fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
     let times = if let Over::Product(other) = free.over { format!(" times {other:?}") } else { String::new() };
     let step = if free.over == Over::Step { " step" } else { "" };
-    Cell {
+    CauseCell {
         name: names::UNKNOWN,
         place: free.motion.place(),
         key: format!("{:?} by {:?}{times}{step}", free.motion, free.of),
@@ -187,11 +186,14 @@ fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
     out
 }
 
-/// Whether a named cell is this motion over this variable in all shapes.
-fn is_listed(motion: Motion, of: Variable, over: Over) -> bool {
+/// The cause whose cell is this motion over this variable in all shapes, if there is one.
+fn listed_as(motion: Motion, of: Variable, over: Over) -> Option<&'static str> {
     match (motion, of, over) {
-        (Motion::Joint { joint }, Variable::Approach { joint: by } | Variable::Load { joint: by }, _) => joint == by,
-        (Motion::Joint { .. } | Motion::Base { .. } | Motion::Tool { .. }, Variable::Time, Over::Step) => true,
-        _ => false,
+        (Motion::Joint { joint }, Variable::Approach { joint: by }, _) if joint == by => Some(names::BACKLASH),
+        (Motion::Joint { joint }, Variable::Load { joint: by }, _) if joint == by => Some(names::JOINT_COMPLIANCE),
+        (Motion::Joint { .. }, Variable::Time, Over::Step) => Some(names::ZERO_SHIFT),
+        (Motion::Base { .. }, Variable::Time, Over::Step) => Some(names::BASE_SHIFT),
+        (Motion::Tool { .. }, Variable::Time, Over::Step) => Some(names::TOOL_SHIFT),
+        _ => None,
     }
 }

@@ -1,7 +1,7 @@
 //! The cells that have a name: each cause of the library at each of its places, in the shapes that it proposes and as curves of the same
 //! physics.
 
-use super::cell::{Cell, FreeShape, Over, Shape, ShapeGroup, Shapes, not_quite_straight};
+use super::cell::{CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, not_quite_straight};
 use crate::criteria::cells::{COMMON, RARE, RARER};
 use crate::diagnose::types::Question;
 use crate::effect::{
@@ -17,11 +17,11 @@ const OF_MOST_ARMS: [&str; 11] = [
     names::ZERO_SHIFT,
     names::AXIS_WOBBLE,
     names::LINK_COMPLIANCE,
-    "base_compliance",
-    "thermal_growth",
-    "tracker_drift",
-    "tracker_circle",
-    "tracker_elevation",
+    names::BASE_COMPLIANCE,
+    names::THERMAL_GROWTH,
+    names::TRACKER_DRIFT,
+    names::TRACKER_CIRCLE,
+    names::TRACKER_ELEVATION,
 ];
 
 /// ln of the prior odds of a cell of a cause; `weight` is by what rarity is multiplied.
@@ -39,8 +39,8 @@ pub(super) fn cell_of(cause: &'static str) -> &'static str {
     if cause == names::JOINT_HARDENING { names::JOINT_COMPLIANCE } else { cause }
 }
 
-/// All cells with a name; those that are to be left out keep their shapes and lose the name.
-pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, question: &Question) -> Vec<Cell> {
+/// All cells with a name, but of those that are to be left out: cells without a name take their place.
+pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, question: &Question) -> Vec<CauseCell> {
     let Question { without, own: declared, prior_weight, .. } = *question;
     let mut all: BTreeMap<(&'static str, Place), Vec<Hypothesis>> = BTreeMap::new();
     // What is a cell of its own without a name, or no cell at all.
@@ -48,11 +48,12 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
     let causes = CAUSES.iter().filter(|cause| !other.contains(&cause.name()));
     let proposed = causes.flat_map(|cause| cause.propose(survey));
     let proposed = proposed.chain(declared.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));
-    for hypothesis in proposed {
+    let left_out = |name: &str| without.iter().any(|out| out == name);
+    for hypothesis in proposed.filter(|hypothesis| !left_out(hypothesis.form.name())) {
         let key = (cell_of(hypothesis.form.name()), hypothesis.form.place());
         all.entry(key).or_default().push(hypothesis);
     }
-    for joint in survey.revolute() {
+    for joint in survey.revolute().filter(|_| !left_out(names::CABLE_DRAG)) {
         let pulled = hoses(survey, joint);
         if !pulled.is_empty() {
             all.entry((names::CABLE_DRAG, Place::Joint(joint))).or_default().extend(pulled);
@@ -61,9 +62,8 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
         let mut groups = weighed(hypotheses);
         groups.extend(curves(name, place, &groups, values, survey.joints()));
-        let told = if without.iter().any(|out| out == name) { names::UNKNOWN } else { name };
-        Cell {
-            name: told,
+        CauseCell {
+            name,
             place,
             key: format!("{name}@{place}"),
             log_prior: log_prior(name, prior_weight),
@@ -81,7 +81,7 @@ fn weighed(hypotheses: Vec<Hypothesis>) -> Vec<ShapeGroup> {
     let one = |hypothesis: Hypothesis| {
         let weight = weight(&hypothesis);
         let is_bent = hypothesis.form.name() == names::JOINT_HARDENING || weight < 0.5 * plain && hypothesis.tried > 1.0;
-        let shape = Shape { shares: Vec::new(), log_weight: (weight / sum).ln(), is_bent };
+        let shape = CellShape { shares: Vec::new(), log_weight: (weight / sum).ln(), is_bent };
         ShapeGroup {
             forms: vec![hypothesis.form],
             shapes: vec![shape],
@@ -116,7 +116,7 @@ fn curves(
             let [low, high] = super::cell::support(&values);
             let law = Law::of(Variable::Approach { joint }).times(load, Basis::Series { low, high, count: 8 });
             let shares = std::iter::once(0.5).chain([0.3, 0.12, 0.04, 0.02, 0.01, 0.006, 0.004]).collect();
-            let shape = Shape { shares, log_weight: 0.3_f64.ln(), is_bent: true };
+            let shape = CellShape { shares, log_weight: 0.3_f64.ln(), is_bent: true };
             let form = Term::new(&Unknown, motion, law).into();
             vec![ShapeGroup { forms: vec![form], shapes: vec![shape], positive: false, largest: f64::INFINITY }]
         }

@@ -10,10 +10,11 @@ mod evidence;
 mod frame;
 mod generated;
 mod listed;
+mod scan;
 mod search;
 mod state;
 
-pub(crate) use answer::{Answer, FoundCause};
+pub(crate) use answer::{Answer, FoundCell};
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
@@ -21,8 +22,8 @@ use crate::criteria::cells::{IDLE, ROUNDS};
 use crate::effect::{Basis, Form, Law, Motion, Variable};
 use crate::estimate::Prior;
 use cell::FreeShape;
-use frame::{Frame, NoiseShape};
-use search::Table;
+use frame::{NoiseShape, SearchRows};
+use scan::CauseTable;
 use state::Component;
 
 /// What rounds of searching around better and better models keep.
@@ -60,14 +61,14 @@ impl Rounds {
         self.round += 1;
         let survey = view.survey();
         let noise = if self.round > 1 { NoiseShape::of(view, fitter.data.rows()) } else { NoiseShape::default() };
-        let mut frame = Frame::of(view, now, fitter, noise);
+        let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
-        let keeps = |cell: &cell::Cell| {
+        let keeps = |cell: &cell::CauseCell| {
             !(fitter.causes_of_the_arm_first()
                 && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
         };
-        let mut table = Table::new(&mut frame, &survey, question, &self.shown, keeps);
+        let mut table = CauseTable::new(&mut frame, &survey, question, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         let mut components = Vec::new();
@@ -113,7 +114,7 @@ impl Rounds {
 
 /// Components as causes of the whole model, each with what the evidence says of the size of its coefficients; waves that the rows could not
 /// show are left out.
-fn estimated(table: &Table, components: &[Component]) -> Vec<EstimatedCause> {
+fn estimated(table: &CauseTable, components: &[Component]) -> Vec<EstimatedCause> {
     let all: Vec<&Component> = components.iter().collect();
     let coefficients = table.state(&all, None).coefficients(&all, table.frame);
     let mut out = Vec::new();

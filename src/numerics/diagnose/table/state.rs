@@ -3,9 +3,9 @@
 //! With the components' columns Z of unit prior variance and noise kappa^2: X' C^-1 X = (X'X - X'Z (kappa^2 + Z'Z)^-1 Z'X) / kappa^2, so that a
 //! component is left out, or another one put in, without a pass over the rows.
 
-use super::cell::{Shape, ShapeGroup};
-use super::evidence::{GroupEvidence, Rows, evidence};
-use super::frame::{Columns, Frame, product, view};
+use super::cell::{CellShape, ShapeGroup};
+use super::evidence::{EvidenceRows, GroupEvidence, evidence};
+use super::frame::{SearchRows, UnitColumns, product, view};
 use crate::criteria::cells::NU;
 use crate::diagnose::pool::dot;
 use crate::effect::Form;
@@ -22,20 +22,20 @@ pub(super) struct SeenGroup {
     pub group: ShapeGroup,
     /// Its columns among those of its block.
     pub range: Range<usize>,
-    /// Columns of each form.
+    /// UnitColumns of each form.
     pub counts: Vec<usize>,
     gram: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
 /// All shapes of a cell with their columns.
-pub(super) struct Block {
+pub(super) struct CellColumns {
     pub groups: Vec<SeenGroup>,
-    pub columns: Columns,
+    pub columns: UnitColumns,
 }
 
-impl Block {
-    pub fn of(groups: Vec<ShapeGroup>, frame: &Frame) -> Self {
+impl CellColumns {
+    pub fn of(groups: Vec<ShapeGroup>, frame: &SearchRows) -> Self {
         let forms: Vec<Form> = groups.iter().flat_map(|group| group.forms.iter().cloned()).collect();
         let (columns, counts) = frame.columns(&forms);
         let (mut first, mut counts) = (0, counts.into_iter());
@@ -55,14 +55,14 @@ impl Block {
     }
 }
 
-impl Block {
+impl CellColumns {
     /// The shape of a component alone.
-    pub fn of_component(own: &Component, frame: &Frame) -> Self {
+    pub fn of_component(own: &Component, frame: &SearchRows) -> Self {
         let values = (*own.values).clone();
         let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
         let range = 0..values.ncols();
         let group = SeenGroup { group: (*own.group).clone(), range, counts: own.counts.clone(), gram, gradient };
-        Self { groups: vec![group], columns: Columns { values, square: (*own.square).clone() } }
+        Self { groups: vec![group], columns: UnitColumns { values, square: (*own.square).clone() } }
     }
 
     /// The largest share of a motion that the columns of a group can make, by their products with it; of unit length.
@@ -92,14 +92,14 @@ pub(super) struct Component {
     pub cell: usize,
     pub forms: Vec<Form>,
     pub counts: Vec<usize>,
-    pub shape: Shape,
+    pub shape: CellShape,
     /// Whether, and up to which size, its coefficients are positive.
     pub group: Arc<ShapeGroup>,
     pub values: Arc<DMatrix<f64>>,
     pub square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
     pub amplitude: f64,
-    /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
+    /// UnitColumns whose products with themselves are its part in the covariance: the directions that the rows could show.
     pub part: Arc<DMatrix<f64>>,
 }
 
@@ -148,7 +148,7 @@ struct PartCache {
 
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
-    pub fn know(&self, components: &[&Component], frame: &Frame) {
+    pub fn know(&self, components: &[&Component], frame: &SearchRows) {
         let Ok(mut cache) = self.0.write() else { return };
         if cache.pairs.len() > 20_000 {
             *cache = PartCache::default();
@@ -202,11 +202,11 @@ impl PartProducts {
 }
 
 /// Some components in the covariance.
-pub(super) struct State {
+pub(super) struct KnownState {
     /// Standard deviation of the noise over what is stated.
     pub kappa: f64,
     /// What is left, seen through the covariance.
-    pub rows: Rows,
+    pub rows: EvidenceRows,
     /// Which components, by their numbers.
     pub components: Vec<u64>,
     /// Cholesky factor of kappa^2 + Z'Z.
@@ -215,9 +215,9 @@ pub(super) struct State {
     along: DVector<f64>,
 }
 
-impl State {
+impl KnownState {
     /// Components with the noise that fits them, or with a stated one.
-    pub fn of(components: &[&Component], products: &PartProducts, frame: &Frame, kappa: Option<f64>) -> Self {
+    pub fn of(components: &[&Component], products: &PartProducts, frame: &SearchRows, kappa: Option<f64>) -> Self {
         let (gram, along) = products.of(components);
         let count = along.len();
         let rows = frame.rows();
@@ -245,7 +245,7 @@ impl State {
         let left = (rows.square - solved_along.norm_squared()).max(0.0) / square;
         Self {
             kappa: square.sqrt(),
-            rows: Rows { square: left, ..rows },
+            rows: EvidenceRows { square: left, ..rows },
             components: components.iter().map(|own| own.id).collect(),
             lower,
             along: solved_along,
@@ -253,7 +253,7 @@ impl State {
     }
 
     /// The likeliest coefficients (SI) of its components, one component after another.
-    pub fn coefficients(&self, components: &[&Component], frame: &Frame) -> Vec<Vec<f64>> {
+    pub fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
         let z = side_by_side(components, frame.residual_rows());
         let mut weights = self.along.clone();
         let count = weights.len();
@@ -316,7 +316,7 @@ impl State {
     }
 
     /// Standard error of each coefficient (SI) of a block of one group beside the components.
-    pub fn errors(&self, block: &Block, across: &DMatrix<f64>) -> Vec<f64> {
+    pub fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else { return Vec::new() };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
@@ -329,7 +329,7 @@ impl State {
     }
 
     /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.
-    pub fn bound(&self, block: &Block, across: &DMatrix<f64>, first: usize) -> f64 {
+    pub fn bound(&self, block: &CellColumns, across: &DMatrix<f64>, first: usize) -> f64 {
         let (whole, half) = (*NU + self.rows.square, 0.5 * (self.rows.freedom + *NU));
         let mut most = f64::NEG_INFINITY;
         for group in &block.groups {
@@ -353,7 +353,13 @@ impl State {
 
     /// What each group of a block says: for every shape ln of its evidence with its weight, and its amplitude; nothing of a shape whose
     /// coefficient would have a size that it cannot have.
-    pub fn shapes(&self, block: &Block, across: &DMatrix<f64>, first: usize, mut each: impl FnMut(usize, usize, GroupEvidence)) {
+    pub fn shapes(
+        &self,
+        block: &CellColumns,
+        across: &DMatrix<f64>,
+        first: usize,
+        mut each: impl FnMut(usize, usize, GroupEvidence),
+    ) {
         for (g, group) in block.groups.iter().enumerate() {
             let (gram, gradient) = self.seen(group, across, first);
             let single = gradient.len() == 1;

@@ -6,7 +6,7 @@ use super::rivals::share_with_identities;
 use crate::criteria::cells::{DETAIL, TRACE};
 use crate::criteria::words::FIRM;
 use crate::diagnose::round::FitState;
-use crate::diagnose::table::FoundCause;
+use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
 use crate::diagnose::words::{left_out, not_so, sentence, small, told};
 use crate::effect::{
@@ -37,11 +37,11 @@ pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
 
 /// What was found, with the causes of the model that are a part of each but no numbers of it: what has no name and is small beside a finding
 /// at its place, or next to nothing beside the largest of all, is what the shapes of those leave.
-fn without_details(last: &LastRound) -> Vec<(FoundCause, Vec<usize>)> {
-    let sized = |found: &FoundCause| (size(last, &found.members), found.clone(), Vec::new());
-    let mut all: Vec<(f64, FoundCause, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
+fn without_details(last: &LastRound) -> Vec<(FoundCell, Vec<usize>)> {
+    let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
+    let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut out: Vec<(f64, FoundCause, Vec<usize>)> = Vec::new();
+    let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
         let first = (found.effect == names::UNKNOWN).then(|| {
             let here = out.iter().position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
@@ -56,9 +56,9 @@ fn without_details(last: &LastRound) -> Vec<(FoundCause, Vec<usize>)> {
 }
 
 /// A finding with its numbers in the whole model.
-fn finding(last: &LastRound, found: &FoundCause, details: &[usize]) -> Finding {
+fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     let state = &last.state;
-    let FoundCause { effect, place, ref members, .. } = *found;
+    let FoundCell { effect, place, ref members, .. } = *found;
     let form = |i: &usize| state.causes[*i].form.clone();
     let mut forms: Vec<Form> = members.iter().map(form).collect();
     let mut rivals = found.rivals.clone();
@@ -113,7 +113,7 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
 
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows, or beyond what the
 /// recording holds.
-fn impossible(last: &LastRound, found: &FoundCause) -> Option<String> {
+fn impossible(last: &LastRound, found: &FoundCell) -> Option<String> {
     let state = &last.state;
     found.members.iter().zip(&found.bounds).find_map(|(i, (positive, largest))| {
         let form = &state.causes[*i].form;
