@@ -152,7 +152,7 @@ pub struct ExplainedShare {
     pub name: String,
     /// Share of the squared residual that the base model leaves, in standard deviations.
     pub share: f64,
-    /// How many parameters it takes, which alone explain as many residual rows of noise.
+    /// How many numbers its curve has.
     pub parameters: usize,
     /// Twice ln of its posterior odds: positive where it is likelier than nothing.
     pub delta_bic: f64,
