@@ -53,8 +53,8 @@
 //! 4. [`estimate::fit()`] predicts the point: [`robot::RobotModel`] is the nominal chain, and every [`effect::Effect`] of the
 //!    [`effect::EffectStack`] adds a small motion at its place on the chain, with its derivatives by its parameters. Levenberg-Marquardt on
 //!    QR factors moves the parameters; those that the data cannot determine are held and reported.
-//! 5. [`diagnose::diagnose`] asks of what is left which cause explains it: hypotheses of all causes are compared after geometry has
-//!    absorbed its part, the best set is refitted, folds decide.
+//! 5. [`diagnose::diagnose`] asks of what is left which cause explains it: all cells of the table of causes, with a name or without, are
+//!    compared by their evidence after geometry has absorbed its part; those that win are fitted with the whole model, until none changes.
 //! 6. The stage turns model and residual back into rows: `parameters`, `prediction` (measured minus predicted of our row, in mm),
 //!    `findings`. [`store`] checks them against their schema, names them by the hash of their content, and commits.
 //! 7. [`stage::Validate`] states the errors of each set after every step; [`report`] writes one page from the tables; [`cli`] prints.
@@ -115,7 +115,7 @@
 //! | word | what it means here |
 //! |---|---|
 //! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
-//! | form | a cause at a place with its shape numbers: a term, or a motion with physics of its own; a hypothesis is a form that a search may choose |
+//! | form | a cause at a place with its shape numbers: a term, or a motion with physics of its own; a hypothesis is a form that a cause proposes |
 //! | term | a form that is a law times a motion at a place |
 //! | reading | what a row measured of one kind; a point is a reading like any other, and may lack axes |
 //! | declared effect | a cause that a user states in YAML: place, motion, laws as formulas; its forms carry the declaration |
@@ -123,7 +123,9 @@
 //! | place | where on the chain (or in the measurement) a cause acts: joint 2, link 3, base, tool, recording |
 //! | law | a function of what a row offers (angle, load, time ...): a basis of one variable, or a product of two |
 //! | shape number | a parameter that enters a law nonlinearly (a threshold, a time, a width); coefficients enter linearly |
-//! | finding | causes of one name and place that a diagnosis keeps, with their evidence |
+//! | cell | a place, a motion there and what it follows, whatever the curve: what a diagnosis compares, with the name of a cause or `unknown` |
+//! | evidence | how probable the rows are with a cell over without it, its size and the scale of the noise integrated |
+//! | finding | cells of one name and place that a diagnosis keeps, with their evidence |
 //! | rival | another explanation of a finding that these data do not exclude |
 //! | residual | measured minus predicted; whitened: in standard deviations |
 //! | excess sigma | standard deviation of the residuals beyond the stated noise |

@@ -30,17 +30,18 @@ pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
     #[serde(default = "fit_set")]
     pub on: Vec<String>,
-    /// By what the penalties of rare causes are multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
+    /// By what ln of the odds of rare causes against common ones is multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
     pub prior_weight: f64,
-    /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it.
+    /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it. Its odds
+    /// scale those of causes without a name, products of two variables apart.
     #[serde(default = "open_world")]
     pub open_world: f64,
-    /// Causes that are not tried and never named: what a cell cannot have, or what a test of the library leaves out. What looks like one
-    /// all the same is `unknown`; of geometry and ratios the numbers of the robot file stay.
+    /// Causes that are never named: what an arm cannot have, or what a test of the library leaves out. What looks like one all the same is
+    /// `unknown` at its place; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
-    /// Files with effects of your own, which are tried beside those of the library.
+    /// Files with effects of your own, which are compared with those of the library.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<RawFile>,
 }

@@ -39,7 +39,7 @@ criteria! {
     DETAIL: f64 = 0.05, "share", "physics: no law is met to a twentieth", "";
     /// Probability that nothing more is there from which what is left is taken for noise.
     SETTLED: f64 = 0.3, "probability", "judgement: no cell that would have joined", "";
-    /// The same of the strongest finding anywhere.
+    /// Share of the strongest finding anywhere below which what has no name is a detail of that.
     TRACE: f64 = 0.015, "share", "physics: no law is met to a hundredth", "";
     /// What a motion leaves of the second order: this times its square.
     SECOND_ORDER: f64 = 0.5, "1/m", "physics: half of the square of a motion over the reach of an arm, a metre", "";

@@ -1,11 +1,11 @@
-//! How causes are searched: the criterion, the gate, what is refined.
+//! When what is left is more than noise, how shapes of formulas are refined, and how few rows are searched at all.
 
 use super::CriterionValue;
 use super::table::criteria;
 
 criteria! {
     "search";
-    /// The gate is closed above this probability that what is left is noise.
+    /// Below this probability that what is left is noise it has structure.
     SIGNIFICANT: f64 = 0.004, "probability", "count: one recording in 250 without a cause is searched in vain", "of 2: halved exact -1, placed -1, explained -1, held out x2.535, 2 moved; doubled nothing";
     /// Levels of refinement of a shape, and how many may bring nothing.
     LEVELS: i32 = 10, "levels", "count: steps fall to a thirtieth", "";

@@ -17,17 +17,18 @@ pub struct Question<'a> {
     pub validate: &'a [usize],
     /// The number of the set that each row belongs to.
     pub set: &'a [usize],
-    /// By what the penalties of rare causes (-2 ln of their odds) are multiplied: 1 as the library believes.
+    /// By what ln of the prior odds of rare causes against common ones is multiplied: 1 as the library believes, 0 all alike.
     pub prior_weight: f64,
-    /// Prior probability that what acts somewhere is no cause of the list, above 0 and below 1.
+    /// Prior probability that what acts somewhere is no cause of the list, above 0 and below 1: its odds scale those of all cells without a
+    /// name but for products.
     pub open_world: f64,
-    /// Names of causes that are not tried, and not given to what looks like them.
+    /// Names that are not given: the cells of these causes stay and are `unknown`; of the base model, causes that are not fitted.
     pub without: &'a [String],
-    /// Effects that the user declares: they are tried beside the library's.
+    /// Effects that the user declares: cells beside those of the library.
     pub own: &'a [&'static DeclaredCause],
     /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
     pub beside_simulation: bool,
-    /// The seed of the bootstrap and the folds.
+    /// The seed of the folds.
     pub seed: u64,
 }
 
@@ -43,15 +44,14 @@ pub struct JointRepeatability {
 /// How well a finding stands; of torques, lengths are Nm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Evidence {
-    /// F statistic of the finding beside all others.
+    /// Fall of the squared residual beside all other findings by direction that the rows could show, in variances of the noise.
     pub f_statistic: f64,
     /// Chance that noise gives as much to this form alone: the search among many is in the probabilities, not in this.
     pub p_value: f64,
-    /// How much worse the criterion is without it.
+    /// Twice ln of the evidence for it beside all others, without prior odds. Of torques: how much worse the criterion is without it.
     pub delta_bic: f64,
-    /// Fall of the rms error of fitted rows under fits that did not see their pose, m; `None` where poses are too few, or several effects
-    /// make up the finding. Of torques: of held-out rows over all joints when what is left is fitted again (left as it is for wrong masses,
-    /// for which tolerances would bend); `None` where none are held out.
+    /// `None` of positions. Of torques: fall of the rms error of held-out rows over all joints when what is left is fitted again (left as it
+    /// is for wrong masses, for which tolerances would bend); `None` where none are held out.
     pub heldout_gain: Option<f64>,
     /// Rms of the whole effect over the recording, m.
     pub effect_rms: f64,
@@ -66,13 +66,14 @@ pub struct RivalCause {
     pub effect: &'static str,
     /// Where it acts.
     pub place: Place,
-    /// How much worse the criterion is with it in place of the finding.
+    /// Twice ln of the posterior odds of the finding against it. Of torques: how much worse the criterion is with it in place of the finding.
     pub delta_bic: f64,
     /// That it is this cause and not the finding's, see [`Probabilities`].
     pub probability: f64,
 }
 
-/// How probable it is that a finding is what it is called; with those of its rivals, `name` and `none` add up to one.
+/// How probable it is that a finding is what it is called, the other findings taken as they stand: its cell, all that do much of the same and
+/// nothing are weighed. With those of its rivals, `name` and `none` add up to one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Probabilities {
     /// That it is the named effect at the named place.
@@ -142,7 +143,7 @@ impl Finding {
     }
 }
 
-/// The best of all hypotheses at a place, or of a variable.
+/// The likeliest of all cells at a place, or of a variable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExplainedShare {
     /// `place` or `variable`.
@@ -151,11 +152,11 @@ pub struct ExplainedShare {
     pub name: String,
     /// Share of the squared residual that the base model leaves, in standard deviations.
     pub share: f64,
-    /// How many parameters it takes, which alone explain as many residual rows of noise.
+    /// How many numbers its curve has.
     pub parameters: usize,
-    /// Fall of the criterion: positive where it is more than chance.
+    /// Twice ln of its posterior odds: positive where it is likelier than nothing.
     pub delta_bic: f64,
-    /// The effect that does it.
+    /// The name of the cell.
     pub effect: &'static str,
 }
 
@@ -255,13 +256,13 @@ pub struct Diagnosis {
     pub after: Option<ErrorLengths>,
     /// Whether the errors are of held-out rows.
     pub held_out: bool,
-    /// Errors of the fitted rows (`kept`) under fits without their poses.
+    /// Errors of the fitted rows (`kept`) under fits without their poses, which choose nothing.
     pub folds: Option<Folds>,
     /// Strongest first.
     pub findings: Vec<Finding>,
     /// Formulas for findings without a name, those of a finding cheapest first.
     pub formulas: Vec<ClosedForm>,
-    /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
+    /// Findings that are not in the model, a sentence each; a search drops what does not pay and states none.
     pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.
     pub clock: bool,
@@ -273,13 +274,13 @@ pub struct Diagnosis {
     pub signature: Option<String>,
     /// What to measure next, a sentence each.
     pub next_measurements: Vec<String>,
-    /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise, where that was asked.
+    /// Rms length of what is left at fitted rows, m.
     pub leftover_rms: f64,
     /// Reduced chi-square of the fitted rows; 1 for noise alone.
     pub chi_square: f64,
-    /// Probability that the residual of the base model is noise.
+    /// Probability that no cell is there, of what the base model leaves.
     pub gate_first: Option<f64>,
-    /// The same of the residual with all findings.
+    /// Probability that no further cell is there, beside all findings.
     pub gate_last: Option<f64>,
     /// Repeatability of the joints, as the recording shows it.
     pub repeatability: JointRepeatability,

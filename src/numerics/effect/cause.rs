@@ -95,7 +95,7 @@ pub trait Cause: Sync {
         self.about().arm_effect.map(|make| make(setting))
     }
 
-    /// Every hypothesis that the recording can speak of.
+    /// Every hypothesis that the recording can speak of; those of one place are the shapes of one cell of a diagnosis.
     fn propose(&self, _survey: &Survey) -> Vec<Hypothesis> {
         Vec::new()
     }

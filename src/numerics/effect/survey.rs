@@ -184,14 +184,14 @@ fn only_payload_change(data: &Measurements, rows: &[usize]) -> Option<f64> {
     changes.next().filter(|_| changes.next().is_none())
 }
 
-/// An effect at a place in a form, as a possible cause of what the model leaves.
+/// An effect at a place in a form: a shape of the cell that its cause is there.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
     /// What it would add to the model.
     pub form: Form,
-    /// How many forms of the kind are tried; twice its logarithm is the penalty.
+    /// How many forms of the kind are tried, which share the weight of one among the shapes of a cell.
     pub tried: f64,
-    /// -2 ln of the prior odds beyond those of effects, places and forms being alike.
+    /// -2 ln of the prior odds against the other shapes of its cell.
     pub prior_penalty: f64,
     /// True where only positive coefficients make sense.
     pub positive: bool,
@@ -229,7 +229,7 @@ impl Hypothesis {
         Self { inherits: true, ..self }
     }
 
-    /// With more penalty, -2 ln of the odds.
+    /// Less likely beside the other shapes of its cell, -2 ln of the odds.
     pub fn penalised(self, prior_penalty: f64) -> Self {
         Self { prior_penalty: self.prior_penalty + prior_penalty, ..self }
     }

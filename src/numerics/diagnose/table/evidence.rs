@@ -2,7 +2,7 @@
 //! and for a curve of forty.
 //!
 //! With columns X of unit rms motion, prior variances a^2 v_k (sum of v_k = 1) and L, z the eigenvalues and projected gradient of V^1/2 X'X V^1/2,
-//! ln E(a) = -1/2 sum_k ln(1 + a^2 L_k) - (n + nu)/2 ln[1 - sum_k z_k^2 a^2 L_k / (1 + a^2 L_k) / (nu + r'r)]: the scale of the noise is
+//! ln E(a) = -1/2 sum_k ln(1 + a^2 L_k) - (n + nu)/2 ln[1 - sum_k z_k^2 a^2 / (1 + a^2 L_k) / (nu + r'r)]: the scale of the noise is
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
 use crate::criteria::cells::{LARGEST, NU, SMALLEST};
