@@ -3,6 +3,7 @@
 
 use super::cell::{CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, not_quite_straight};
 use crate::criteria::cells::{COMMON, RARE, RARER};
+use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::effect::{
     AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, names,
@@ -60,17 +61,27 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
         }
     }
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
+        let unusual = unusual(&hypotheses);
         let mut groups = weighed(hypotheses);
-        groups.extend(curves(name, place, &groups, values, survey.joints()));
+        let straight = name == names::JOINT_COMPLIANCE && left_out(names::JOINT_HARDENING);
+        if !straight {
+            groups.extend(curves(name, place, &groups, values, survey.joints()));
+        }
         CauseCell {
             name,
             place,
             key: format!("{name}@{place}"),
-            log_prior: log_prior(name, prior_weight),
+            log_prior: log_prior(name, prior_weight) - prior_weight * unusual,
             shapes: Shapes::Listed(groups),
         }
     };
     all.into_iter().map(cell).collect()
+}
+
+/// By how much, in ln of odds, the commonest form of a cell is rarer than what is rare.
+fn unusual(hypotheses: &[Hypothesis]) -> f64 {
+    let least = hypotheses.iter().map(|hypothesis| hypothesis.prior_penalty).fold(f64::INFINITY, f64::min);
+    0.5 * (least - *effect::RARE).max(0.0)
 }
 
 /// The forms of a cell, weighed by how many like them are tried and how rare they are beside each other.
