@@ -200,7 +200,7 @@ fn the_practice_recordings_join_fully() {
     let mut folders: Vec<_> =
         std::fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect();
     folders.sort();
-    assert_eq!(folders.len(), 10);
+    assert_eq!(folders.len(), 28);
     for folder in folders {
         let arm = std::fs::read_to_string(folder.join("robot.json")).unwrap();
         let arm: serde_json::Value = serde_json::from_str(&arm).unwrap();

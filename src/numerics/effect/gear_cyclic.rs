@@ -106,6 +106,6 @@ fn order(term: &Term, numbers: &[&ParameterEstimate]) -> String {
     let Some(order) = orders::order(term.basis()) else { return String::new() };
     let overtone =
         numbers.get(2..).filter(|pair| pair.len() >= 2).map(|pair| format!(" and {} times by {}", 2.0 * order, amplitude(pair)));
-    let order = figure(order, if order.fract().abs() < 1e-9 { 0 } else { 2 });
+    let order = if order.fract().abs() < 1e-9 { format!("{order:.0}") } else { figure(order, 2) };
     format!("{order} times a turn by {}{}", amplitude(numbers), overtone.unwrap_or_default())
 }

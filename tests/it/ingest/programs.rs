@@ -60,7 +60,7 @@ fn jointtargets_of_rapid_are_rows_in_the_order_of_the_file_and_robtargets_are_co
 
 #[test]
 fn positions_of_one_line_that_no_point_was_measured_at_are_rejected_together() {
-    let desk = desk("cell.MOD", RAPID, "p10,7,8,16\n");
+    let desk = desk("cell.MOD", &RAPID.replace("[0.5,", "[1500,"), "p10,7,8,16\n");
     let yaml = joined("cell.MOD", "rax_#") + "max_rejected_fraction: 0.9\n";
     let tables = desk.run(&settings(&yaml), IngestReads { robot: robot("rrrrrr", 1.0) }).expect("tables");
     let rejected: Vec<RejectedRow> = table::<Rejected>(&tables).into_iter().flat_map(|chunk| chunk.0).collect();

@@ -6,6 +6,7 @@ use super::frame::SearchRows;
 use crate::criteria::cells::{FADING, LIMITS, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
+use crate::observation::only_brought;
 use nalgebra::Vector3;
 
 /// Directions in which the position of the tool is a variable: axes, diagonals of faces and of the cube.
@@ -41,7 +42,9 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
     let left_out = |name: &str| question.without.iter().any(|out| out == name);
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
-    for place in places(survey) {
+    // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
+    let places = if only_brought(survey.data, survey.rows) { Vec::new() } else { places(survey) };
+    for place in places {
         let families = families(place, survey);
         let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();
         for motions in families {
@@ -52,7 +55,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
                 let kind = kind.into_iter().filter(|(of, _)| varies(frame, *of));
                 let all: Vec<_> = kind
                     .flat_map(|(of, over)| motions.iter().map(move |motion| (*motion, of, over)))
-                    .filter(|(motion, of, over)| listed_as(*motion, *of, *over).is_none_or(left_out))
+                    .filter(|(motion, of, over)| listed_as(*motion, *of, *over, survey).is_none_or(left_out))
                     .collect();
                 if !all.is_empty() {
                     groups.push(all);
@@ -187,8 +190,11 @@ fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
 }
 
 /// The cause whose cell is this motion over this variable in all shapes, if there is one.
-fn listed_as(motion: Motion, of: Variable, over: Over) -> Option<&'static str> {
+fn listed_as(motion: Motion, of: Variable, over: Over, survey: &Survey) -> Option<&'static str> {
+    let last = survey.joints().saturating_sub(1);
     match (motion, of, over) {
+        // What the last joint carries is the tool.
+        (Motion::Slide { joint, .. }, Variable::Time, Over::Step) if joint == last => Some(names::TOOL_SHIFT),
         (Motion::Joint { joint }, Variable::Approach { joint: by }, _) if joint == by => Some(names::BACKLASH),
         (Motion::Joint { joint }, Variable::Load { joint: by }, _) if joint == by => Some(names::JOINT_COMPLIANCE),
         (Motion::Joint { .. }, Variable::Time, Over::Step) => Some(names::ZERO_SHIFT),

@@ -6,7 +6,7 @@ use crate::criteria::cells::{COMMON, RARE, RARER};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::effect::{
-    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, names,
+    AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, cause, names,
 };
 use std::collections::BTreeMap;
 
@@ -25,11 +25,11 @@ const OF_MOST_ARMS: [&str; 11] = [
     names::TRACKER_ELEVATION,
 ];
 
-/// ln of the prior odds of a cell of a cause; `weight` is by what rarity is multiplied.
+/// ln of the prior odds of a cell of a cause, those of a user's own as of a common one; `weight` is by what rarity is multiplied.
 fn log_prior(name: &str, weight: f64) -> f64 {
     let odds = match name {
         names::CABLE_DRAG => *RARER,
-        name if OF_MOST_ARMS.contains(&name) => *COMMON,
+        name if OF_MOST_ARMS.contains(&name) || cause(name).is_none() => *COMMON,
         _ => *RARE,
     };
     COMMON.ln() + weight * (odds / *COMMON).ln()

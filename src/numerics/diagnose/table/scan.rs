@@ -7,7 +7,7 @@ use super::state::{CellColumns, Component, KnownState, PartProducts};
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, LEVELS, UNLIKELY};
 use crate::diagnose::types::Question;
-use crate::effect::{Basis, Form, Survey, Variable};
+use crate::effect::{Basis, Form, Survey, Variable, cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,6 +29,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub next: u64,
     /// Keys of cells that are in the model around which the rows are looked at.
     pub from_before: Vec<String>,
+    /// Cells of effects that the user declares.
+    declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
     pub multiplied: Vec<FreeShape>,
 }
@@ -103,6 +105,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             columns += block.columns.values.ncols();
         }
         let products = BTreeMap::new();
+        let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
+        let declared = (0..named.len()).filter(|cell| is_declared(&named[*cell])).collect();
         Self {
             frame,
             survey,
@@ -114,6 +118,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             first,
             columns,
             next: 0,
+            declared,
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
         }
@@ -301,7 +306,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let mut order: Vec<usize> = (0..self.cells.len()).filter(|cell| log_odds[*cell].is_finite()).collect();
         order.sort_by(|a, b| log_odds[*b].total_cmp(&log_odds[*a]).then(a.cmp(b)));
         order.truncate(most);
-        order.extend(also.iter().copied().filter(|cell| !order.contains(cell)).collect::<Vec<_>>());
+        let also = also.iter().chain(&self.declared).copied().filter(|cell| !order.contains(cell));
+        order.extend(also.collect::<Vec<_>>());
         let closely: BTreeMap<usize, CellEvidence> =
             order.into_par_iter().filter_map(|cell| Some((cell, self.closely(cell, state, components)?))).collect();
         for (cell, found) in &closely {
@@ -319,7 +325,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let best = scan.best();
         let open = best.is_some_and(|best| !self.cells[best].is_named());
         let near = |cell: &usize| open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0) && scan.log_odds[*cell] > -5.0;
-        let named = |cell: &usize| self.cells[*cell].is_named() && (Some(*cell) == best || near(cell));
+        let named =
+            |cell: &usize| self.declared.contains(cell) || self.cells[*cell].is_named() && (Some(*cell) == best || near(cell));
         let listed: Vec<usize> = scan.closely.keys().copied().filter(named).collect();
         let refined: Vec<(usize, (Form, f64, f64))> = listed
             .into_par_iter()
