@@ -152,7 +152,8 @@ fn what_a_model_leaves_at_a_pose_is_no_correlated_noise_for_being_measured_three
     }
     let found = diagnosed(&data, 1.0);
     let said = found.not_observable.join("; ");
-    assert!(!said.contains("correlated"), "{said}");
+    let names: Vec<&str> = found.findings.iter().map(|finding| finding.statement.as_str()).collect();
+    assert!(!said.contains("correlated"), "{names:?} {said}");
 }
 
 /// Scatter over reported sigma of the ratios of so many robots, and their mean sigma.

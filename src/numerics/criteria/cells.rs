@@ -33,6 +33,8 @@ criteria! {
     BENDS: f64 = 4.0, "ln of evidence", "literature: strong, Kass and Raftery (1995), for one number", "";
     /// That the evidence misleads: true shapes, places and noise differ a little from every cell's.
     MISLED: f64 = 0.03, "probability", "judgement: until it is measured on concealed recordings", "";
+    /// Share of the probability of a name that another cause has which does the same in whatever data.
+    IDENTITY: f64 = 0.1, "probability", "judgement: the one that was asked first is the usual one", "";
     /// Probability from which another name is told as a rival.
     RIVAL: f64 = 0.02, "probability", "judgement: less would not change what one does", "";
     /// Share of the strongest finding at its place below which what has no name is a detail of it.

@@ -63,14 +63,17 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = next;
             continue;
         };
-        if let Some(change) = correlation_left_by(&next, &fitter) {
+        // What lasts from row to row of standing points is noise only where no cause is left that would explain it.
+        let settled = answer.nothing_last > *SETTLED;
+        let asked = settled || fitter.data.in_motion(&next.screening.kept);
+        if let Some(change) = asked.then(|| correlation_left_by(&next, &fitter)).flatten() {
             let kept = fitter.take_correlation(&change, &next);
             tell(words::of_the_correlation(&fitter));
             now = fitter.fit(&next.model, kept);
             rounds.again();
             continue;
         }
-        if let Some(sigma) = (answer.nothing_last > *SETTLED).then(|| fitter.noise_left_by(&next)).flatten() {
+        if let Some(sigma) = settled.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);
             rounds.again();

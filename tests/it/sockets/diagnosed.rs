@@ -100,7 +100,8 @@ fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;
     recording.q[79 * joints..85 * joints].copy_from_slice(&slipped.q[79 * joints..85 * joints]);
-    let (_, verdict, warnings) = diagnosed(&robot, recording);
-    assert!(warnings.contains("6 rows do not close") && warnings.contains("b/0-0020 to b/0-0025 (6 rows)"), "{warnings}");
+    let (named, verdict, warnings) = diagnosed(&robot, recording);
+    let told = warnings.contains("6 rows do not close") && warnings.contains("b/0-0020 to b/0-0025 (6 rows)");
+    assert!(told, "{named:?}, {warnings}");
     assert!(verdict.statement.unwrap_or_default().contains("ball or fixture moved there"));
 }

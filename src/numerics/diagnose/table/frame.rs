@@ -213,6 +213,13 @@ impl<'a> SearchRows<'a> {
 }
 
 impl NoiseShape {
+    /// Before anything was found: rows that measured one pose count as far as they say something of their own.
+    pub fn at_first(view: &RoundView, rows: usize) -> Self {
+        let mut weights = vec![1.0; rows];
+        share_among_repeats(view, &mut weights);
+        Self { weights, ..Self::default() }
+    }
+
     /// By what a fitted model leaves of the rows: those that are far off count less, and a noise that is stronger in some direction is made
     /// even.
     pub fn of(view: &RoundView, rows: usize) -> Self {
@@ -241,10 +248,45 @@ impl NoiseShape {
             sum += left * left.transpose();
             count += 1.0;
         }
+        share_among_repeats(view, &mut weights);
         let mean = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64;
         let currents = &problem.residual[residual.len()..];
         let currents = (!currents.is_empty()).then(|| (mean(residual) / mean(currents).max(1e-12)).sqrt().clamp(0.2, 5.0));
         Self { weights, whitening: evened(sum, count), currents }
+    }
+}
+
+/// Rows that measured one pose one after another count as one where they differ less among each other than from the model: what they leave is
+/// then the pose's, not the instrument's.
+fn share_among_repeats(view: &RoundView, weights: &mut [f64]) {
+    let (problem, residual) = (&view.problem, view.problem.of_readings());
+    let width = problem.width().unwrap_or(0);
+    let mut poses: Vec<Vec<usize>> = Vec::new();
+    for (i, row) in problem.rows.iter().enumerate() {
+        match poses.last_mut().filter(|pose| problem.data.same_pose(problem.rows[pose[0]], *row)) {
+            Some(pose) => pose.push(i),
+            None => poses.push(vec![i]),
+        }
+    }
+    let (mut within, mut freedom) = (0.0, 0.0);
+    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+        for k in 0..width {
+            let values: Vec<f64> = pose.iter().map(|i| residual[problem.readings_of(*i).start + k]).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            within += values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+            freedom += values.len() as f64 - 1.0;
+        }
+    }
+    if freedom < *EVEN {
+        return;
+    }
+    let within = within / freedom;
+    let whole = residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+    let between = (whole - within).max(0.0);
+    for pose in poses.iter().filter(|pose| pose.len() > 1) {
+        let count = pose.len() as f64;
+        let share = ((between + within) / (count * between + within).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+        pose.iter().for_each(|i| weights[problem.rows[*i]] *= share);
     }
 }
 

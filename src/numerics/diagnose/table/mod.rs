@@ -19,8 +19,9 @@ pub(crate) use answer::{Answer, FoundCell};
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, ROUNDS};
-use crate::effect::{Basis, Form, Law, Motion, Variable};
+use crate::effect::{Basis, Form, Law, Motion, Place, Variable, names};
 use crate::estimate::Prior;
+use crate::observation::only_brought;
 use cell::FreeShape;
 use frame::{NoiseShape, SearchRows};
 use scan::CauseTable;
@@ -60,13 +61,22 @@ impl Rounds {
     pub fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
         self.round += 1;
         let survey = view.survey();
-        let noise = if self.round > 1 { NoiseShape::of(view, fitter.data.rows()) } else { NoiseShape::default() };
+        let noise = if self.round > 1 {
+            NoiseShape::of(view, fitter.data.rows())
+        } else {
+            NoiseShape::at_first(view, fitter.data.rows())
+        };
         let mut frame = SearchRows::of(view, now, fitter, noise);
         let question = fitter.question;
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
+        let brought = only_brought(&fitter.data, question.fit);
         let keeps = |cell: &cell::CauseCell| {
-            !(fitter.causes_of_the_arm_first()
-                && cell.groups(&survey, &|of| view.problem.values(of), false).iter().any(|group| group.forms.iter().any(slow)))
+            // Where nothing but joints was recorded, base and first joint move with all that the target was brought to.
+            let unseen =
+                brought && (cell.place == Place::Base || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
+            let values = |of| view.problem.values(of);
+            let is_slow = || cell.groups(&survey, &values, false).iter().any(|group| group.forms.iter().any(slow));
+            !unseen && !(fitter.causes_of_the_arm_first() && is_slow())
         };
         let mut table = CauseTable::new(&mut frame, &survey, question, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
@@ -88,6 +98,7 @@ impl Rounds {
             components = table.backfit(components, 1);
         }
         components = table.grow(components);
+        components = table.prune(components);
         if !components.is_empty() {
             components = table.swap(components);
             components = table.grow(components);

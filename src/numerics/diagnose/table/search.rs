@@ -89,8 +89,7 @@ impl CauseTable<'_, '_> {
                 components.push(self.component(cell, &found));
             }
         }
-        components = self.backfit(components, 2);
-        self.prune(components)
+        self.backfit(components, 2)
     }
 
     /// Adds cells while they pay. What is smaller than the second order of what this round has found already waits for the next round, which
@@ -136,7 +135,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Drops cells that no longer pay.
-    fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+    pub fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
         loop {
             if components.is_empty() {
                 return components;

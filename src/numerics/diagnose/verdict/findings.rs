@@ -63,7 +63,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     let mut forms: Vec<Form> = members.iter().map(form).collect();
     let mut rivals = found.rivals.clone();
     let mut probabilities = found.probabilities;
-    probabilities.name = share_with_identities(&forms, last.survey, probabilities.name, &mut rivals);
+    probabilities.name = share_with_identities(effect, &forms, last.survey, probabilities.name, &mut rivals);
     let modelled = modelled(last, effect, &forms);
     if let Some((effect, place)) = modelled.as_ref().map(|modelled| modelled.same)
         && !rivals.iter().any(|rival| (rival.effect, rival.place) == (effect, place))
