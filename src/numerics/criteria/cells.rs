@@ -13,6 +13,8 @@ criteria! {
     RARER: f64 = 0.002, "odds", "judgement: a tenth of the common ones", "";
     /// Prior odds of all cells without a name at a place together.
     UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
+    /// Rows with fewer than which no cell without a name is asked: a free curve bends what geometry leaves open.
+    OPEN: usize = 60, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
     /// Probability of a cause in no list for which these odds are.
     USUAL: f64 = 0.3, "probability", "judgement: the default of the setting `open_world`", "";
     /// Prior odds of a product without a name, where one of its variables already shows there.
@@ -50,7 +52,7 @@ criteria! {
     /// Cells of which every shape is asked, after all were asked coarsely.
     CLOSELY: usize = 12, "cells", "judgement: bounds time", "";
     /// Rounds of fitting the whole model and searching around it.
-    ROUNDS: usize = 4, "rounds", "count: two suffice as a rule, a further one for each size of effects", "";
+    ROUNDS: usize = 5, "rounds", "count: two suffice as a rule, a further one for each size of effects", "";
     /// Correlation lengths of curves, shares of the range of their variable.
     LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.015], "share of the range", "count: threefold, from the whole range to what forty cosines resolve", "";
     /// Share of a curve in a line that is not quite straight, rms over rms.

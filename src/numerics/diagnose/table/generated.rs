@@ -3,7 +3,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, PRODUCT, UNNAMED, USUAL};
+use crate::criteria::cells::{FADING, LIMITS, OPEN, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_brought;
@@ -43,7 +43,8 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
-    let places = if only_brought(survey.data, survey.rows) { Vec::new() } else { places(survey) };
+    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN;
+    let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
         let families = families(place, survey);
         let mut groups: Vec<Vec<(Motion, Variable, Over)>> = Vec::new();

@@ -92,14 +92,15 @@ impl Rounds {
             let scan = table.scan(&state, &[], 12, &[]);
             self.first = Some((table.locate(&state), answer::nothing(&scan)));
         }
-        if components.is_empty() {
-            components = table.start();
-        } else {
-            components = table.backfit(components, 1);
+        let has_begun = !components.is_empty();
+        components = if has_begun { table.backfit(components, 1) } else { table.start() };
+        // Joints that yield come first: masses and currents speak of what yields in the model, and large motions are not linear.
+        let waits = !has_begun && !components.is_empty() && self.round < *ROUNDS;
+        if !waits {
+            components = table.grow(components);
+            components = table.prune(components);
         }
-        components = table.grow(components);
-        components = table.prune(components);
-        if !components.is_empty() {
+        if !waits && !components.is_empty() {
             components = table.swap(components);
             components = table.grow(components);
             components = table.periodic(components);
