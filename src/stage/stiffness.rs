@@ -35,7 +35,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 16;
+    const IMPLEMENTATION: u32 = 17;
     type Reads = StiffnessReads;
     type Writes = Identified;
 

@@ -49,6 +49,11 @@ impl Cause for BaseCompliance {
 impl Placed for TiltingBase {
     placed! { self: Place::Base, &BaseCompliance, [Variable::ArmLoad], self }
 
+    /// The first link bends as the base tilts.
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        vec![(names::LINK_COMPLIANCE, Place::Links(0, 0))]
+    }
+
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names: &[&str] = if self.two { &["x", "y"] } else { &[""] };
         names.iter().map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3)).collect()

@@ -72,6 +72,11 @@ impl Cause for LinkCompliance {
 impl Placed for BentLink {
     placed! { self: Place::Links(self.link, self.link), &LinkCompliance, [Variable::ArmLoad], self }
 
+    /// What carries the first joint's link is the base.
+    fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
+        if self.link == 0 { vec![(names::BASE_COMPLIANCE, Place::Base)] } else { Vec::new() }
+    }
+
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let names: &[&str] = if self.bending == Bending::TwoDirections { &["first", "second"] } else { &[""] };
         names.iter().map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-3)).collect()
