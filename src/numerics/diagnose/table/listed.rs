@@ -2,12 +2,13 @@
 //! physics.
 
 use super::cell::{CauseCell, CellShape, FreeShape, Over, ShapeGroup, Shapes, not_quite_straight};
-use crate::criteria::cells::{COMMON, RARE, RARER};
+use crate::criteria::cells::{BENT, COMMON, RARE, RARER};
 use crate::criteria::effect;
 use crate::diagnose::types::Question;
 use crate::effect::{
     AxisPoint, Basis, CAUSES, DeclaredForm, Hypothesis, Law, Motion, Place, Survey, Term, Unknown, Variable, cause, names,
 };
+use crate::robot::RobotModel;
 use std::collections::BTreeMap;
 
 /// Causes that most arms have; all others of the list are rare.
@@ -26,9 +27,11 @@ const OF_MOST_ARMS: [&str; 11] = [
 ];
 
 /// ln of the prior odds of a cell of a cause, those of a user's own as of a common one; `weight` is by what rarity is multiplied.
-fn log_prior(name: &str, weight: f64) -> f64 {
+fn log_prior(name: &str, place: Place, weight: f64) -> f64 {
     let odds = match name {
         names::CABLE_DRAG => *RARER,
+        // The first link bends as its foundation tilts, and foundations yield more often.
+        names::LINK_COMPLIANCE if place == Place::Links(0, 0) => *RARE,
         name if OF_MOST_ARMS.contains(&name) || cause(name).is_none() => *COMMON,
         _ => *RARE,
     };
@@ -62,7 +65,7 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
     }
     let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
         let unusual = unusual(&hypotheses);
-        let mut groups = weighed(hypotheses);
+        let mut groups = weighed(hypotheses, survey.robot);
         let straight = name == names::JOINT_COMPLIANCE && left_out(names::JOINT_HARDENING);
         if !straight {
             groups.extend(curves(name, place, &groups, values, survey.joints()));
@@ -71,7 +74,7 @@ pub(super) fn cells(survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64
             name,
             place,
             key: format!("{name}@{place}"),
-            log_prior: log_prior(name, prior_weight) - prior_weight * unusual,
+            log_prior: log_prior(name, place, prior_weight) - prior_weight * unusual,
             shapes: Shapes::Listed(groups),
         }
     };
@@ -85,14 +88,16 @@ fn unusual(hypotheses: &[Hypothesis]) -> f64 {
 }
 
 /// The forms of a cell, weighed by how many like them are tried and how rare they are beside each other.
-fn weighed(hypotheses: Vec<Hypothesis>) -> Vec<ShapeGroup> {
+fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
     let weight = |hypothesis: &Hypothesis| (-0.5 * hypothesis.prior_penalty).exp() / hypothesis.tried;
     let sum: f64 = hypotheses.iter().map(weight).sum();
     let plain = hypotheses.iter().map(weight).fold(0.0, f64::max);
     let one = |hypothesis: Hypothesis| {
         let weight = weight(&hypothesis);
-        let is_bent = hypothesis.form.name() == names::JOINT_HARDENING || weight < 0.5 * plain && hypothesis.tried > 1.0;
-        let shape = CellShape { shares: Vec::new(), log_weight: (weight / sum).ln(), is_bent };
+        let is_hardening = hypothesis.form.name() == names::JOINT_HARDENING;
+        let is_bent = is_hardening || weight < 0.5 * plain && hypothesis.tried > 1.0;
+        let shares = if is_hardening { bent_shares(hypothesis.form.numbers(robot).len()) } else { Vec::new() };
+        let shape = CellShape { shares, log_weight: (weight / sum).ln(), is_bent };
         ShapeGroup {
             forms: vec![hypothesis.form],
             shapes: vec![shape],
@@ -101,6 +106,13 @@ fn weighed(hypotheses: Vec<Hypothesis>) -> Vec<ShapeGroup> {
         }
     };
     hypotheses.into_iter().map(one).collect()
+}
+
+/// Shares of a line and of what bends it: a bend is a part of the line, so that the two cannot grow against each other.
+fn bent_shares(count: usize) -> Vec<f64> {
+    let bend = BENT[1] * BENT[1];
+    let each = bend / (1.0 + bend) / (count.max(2) - 1) as f64;
+    std::iter::once(1.0 / (1.0 + bend)).chain(std::iter::repeat_n(each, count.max(2) - 1)).collect()
 }
 
 /// Curves that are the same physics as a cause's own laws.
