@@ -76,7 +76,7 @@ impl Rounds {
                 brought && (cell.place == Place::Base || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
             let values = |of| view.problem.values(of);
             let is_slow = || cell.groups(&survey, &values, false).iter().any(|group| group.forms.iter().any(slow));
-            !unseen && !(fitter.causes_of_the_arm_first() && is_slow())
+            !(unseen || fitter.causes_of_the_arm_first() && is_slow())
         };
         let mut table = CauseTable::new(&mut frame, &survey, question, &self.shown, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
