@@ -19,7 +19,7 @@ const EVIDENCE: [(&str, &str); 8] = [
     ("of none", "that it is neither this effect nor any of its rivals"),
     ("F", "gain per parameter over the residual variance; about 1 for noise"),
     ("p", "chance that noise gives as much to this form alone; the search among many is in the probabilities"),
-    ("BIC", "increase of the BIC without the finding; above 10 is strong"),
+    ("2 ln evidence", "twice the ln of the evidence for the finding beside all others; above 10 is strong"),
     ("cross-validated gain", "cross-validated rms without the finding minus that with it"),
     ("size", "rms of the whole effect at the tool"),
 ];
@@ -105,8 +105,8 @@ fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
     let facts = [
         ("noise of one point, rms", noise),
         ("left over at fitted rows, rms", size(verdict.leftover_rms_mm, verdict.leftover_rms_rad)),
-        ("chance of such a final residual from noise alone", verdict.p_after.map(|p| significant(p, 2))),
-        ("chance of such a residual of the simulation from noise alone", verdict.p_before.map(|p| significant(p, 2))),
+        ("probability that no further cause is there", verdict.p_after.map(|p| significant(p, 2))),
+        ("the same before any finding", verdict.p_before.map(|p| significant(p, 2))),
         ("repeatability of the joints", verdict.p_after.map(|_| format!("{} arcsec", significant(repeatability, 2)))),
         ("rows fitted", Some(count(verdict.points))),
     ];
@@ -198,7 +198,7 @@ fn formula(rows: &[FormRow]) -> String {
 
 fn rival(row: &RivalRow) -> String {
     let probability = row.probability.map(|p| format!("probability {p:.2}, ")).unwrap_or_default();
-    format!("{} at {} ({probability}BIC {} from it)", row.effect, row.place, significant(row.delta_bic, 2))
+    format!("{} at {} ({probability}2 ln evidence {} less)", row.effect, row.place, significant(row.delta_bic, 2))
 }
 
 /// Before with the fitted curve and its band, and after on the same scales.

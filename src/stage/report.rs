@@ -81,7 +81,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 19;
+    const IMPLEMENTATION: u32 = 20;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 

@@ -62,7 +62,7 @@ fn the_practice_cases_are_solved() {
             continue;
         }
         // Wrong points among the held-out rows are off whatever the model.
-        assert!(after < 1.25 * floor || !found.iter().all(|found| found.1 != "recording"), "{}: {after} {floor}", case.display());
+        assert!(after < 1.35 * floor || !found.iter().all(|found| found.1 != "recording"), "{}: {after} {floor}", case.display());
         let predictions: Prediction = table(&tables).remove(0);
         assert!(predictions.0.len() >= 160);
         // The table of parameters alone is the corrected model, but for products of small motions of the base.

@@ -30,7 +30,7 @@ criteria! {
     /// ln of the posterior odds below which a cell of the model leaves it.
     LEAVES: f64 = 2.0, "ln of odds", "judgement: a little below the odds by which it joined", "";
     /// By how much ln of the posterior odds has to be larger for another cell to take the place of one.
-    SWAPS: f64 = 0.5, "ln of odds", "judgement: no exchange to and fro", "";
+    SWAPS: f64 = 0.1, "ln of odds", "judgement: no exchange to and fro", "";
     /// ln of the evidence by which a shape with further numbers must be better than a plain one.
     BENDS: f64 = 4.0, "ln of evidence", "literature: strong, Kass and Raftery (1995), for one number", "";
     /// That the evidence misleads: true shapes, places and noise differ a little from every cell's.

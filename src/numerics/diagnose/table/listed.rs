@@ -96,19 +96,18 @@ fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
         let weight = weight(&hypothesis);
         let is_hardening = hypothesis.form.name() == names::JOINT_HARDENING;
         let is_bent = is_hardening || weight < 0.5 * plain && hypothesis.tried > 1.0;
-        let shares = if is_hardening { bent_shares(hypothesis.form.numbers(robot).len()) } else { Vec::new() };
-        let shape = CellShape { shares, log_weight: (weight / sum).ln(), is_bent };
-        ShapeGroup {
-            forms: vec![hypothesis.form],
-            shapes: vec![shape],
-            positive: hypothesis.positive,
-            largest: hypothesis.largest,
-        }
+        let shape = |shares, part: f64| CellShape { shares, log_weight: (part * weight / sum).ln(), is_bent };
+        let shapes = if is_hardening {
+            vec![shape(bent_shares(hypothesis.form.numbers(robot).len()), 0.5), shape(Vec::new(), 0.5)]
+        } else {
+            vec![shape(Vec::new(), 1.0)]
+        };
+        ShapeGroup { forms: vec![hypothesis.form], shapes, positive: hypothesis.positive, largest: hypothesis.largest }
     };
     hypotheses.into_iter().map(one).collect()
 }
 
-/// Shares of a line and of what bends it: a bend is a part of the line, so that the two cannot grow against each other.
+/// Shares of a line and of a bend that is a part of it: the two hardly grow against each other.
 fn bent_shares(count: usize) -> Vec<f64> {
     let bend = BENT[1] * BENT[1];
     let each = bend / (1.0 + bend) / (count.max(2) - 1) as f64;
