@@ -14,11 +14,17 @@ criteria! {
     /// Prior odds of all cells without a name at a place together.
     UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
     /// Rows with fewer than which no cell without a name is asked: a free curve bends what geometry leaves open.
-    OPEN: usize = 60, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
+    OPEN: usize = 30, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
     /// Probability of a cause in no list for which these odds are.
     USUAL: f64 = 0.3, "probability", "judgement: the default of the setting `open_world`", "";
     /// Prior odds of a product without a name, where one of its variables already shows there.
     PRODUCT: f64 = 0.0007, "odds", "judgement: less than a rare cause", "";
+    /// Prior odds of a product without a name of which neither variable shows by itself.
+    PAIR: f64 = 1e-5, "odds", "count: the odds of a place over its thousand pairs", "";
+    /// Ratio of what a search leaves to the stated noise above which all pairs of variables are looked at.
+    UNEXPLAINED: f64 = 1.25, "ratio", "judgement: no stated noise is off by more as a rule", "";
+    /// Products, of all pairs of variables, that become cells.
+    PAIRS: usize = 24, "cells", "judgement: bounds time", "";
     /// Degrees of freedom that the stated noise is worth.
     NU: f64 = 20.0, "rows", "judgement: a statement is as good as twenty rows", "";
     /// Smallest amplitude, rms motion of the tool: below it no instrument sees anything.

@@ -59,23 +59,36 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let round = rounds.search(&view, &now, &fitter);
         tell(words::of_a_round(rounds.count(), round.cells, round.causes.iter().map(|cause| &cause.form)));
         let next = fitter.fit(&now.model, round.causes);
+        if std::env::var("DBG").is_ok() {
+            let specs = next.model.stack.specs();
+            for k in 0..next.model.x.len() {
+                let s = &specs[k];
+                if next.ranges.first().is_none_or(|r| k < r.start) {
+                    eprintln!("T {} x {:.3e} prior {:.1e} {:?}", s.name, next.model.x[k], s.prior_sigma, next.fitted.statuses[k]);
+                }
+            }
+        }
         let Some(answer) = round.answer else {
             now = next;
+            fitter.follow(&now);
             continue;
         };
-        // What lasts from row to row of standing points is noise only where no cause is left that would explain it.
+        // What lasts from row to row of standing points is noise where no cause is left that would explain it, or where a cause that follows
+        // time may be that noise.
         let settled = answer.nothing_last > *SETTLED;
-        let asked = settled || fitter.data.in_motion(&next.screening.kept);
+        let asked = settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
         if let Some(change) = asked.then(|| correlation_left_by(&next, &fitter)).flatten() {
             let kept = fitter.take_correlation(&change, &next);
             tell(words::of_the_correlation(&fitter));
             now = fitter.fit(&next.model, kept);
+            fitter.follow(&now);
             rounds.again();
             continue;
         }
         if let Some(sigma) = settled.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);
+            fitter.follow(&now);
             rounds.again();
             continue;
         }

@@ -129,6 +129,15 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
     (model, fitted)
 }
 
+/// Which of the candidates the data can see around a fitted model, in their order.
+pub(crate) fn seen(model: &Model, data: &Measurements, fitted: &Fitted, options: &FitOptions) -> Vec<usize> {
+    let problem = Problem { data, rows: options.rows, excess: fitted.excess() };
+    let factor = problem.observe(model, options.candidates).factor;
+    let prior: Vec<f64> = options.candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
+    let seen = visibility(&factor, &prior).into_iter().zip(options.candidates);
+    seen.filter(|(seen, _)| *seen == Visibility::Seen).map(|(_, k)| *k).collect()
+}
+
 /// What the data (`all`: in all candidates, at the minimum) say of a fitted model.
 fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimisation, all: Evaluation) -> Fitted {
     let prior = |set: &[usize]| set.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect::<Vec<_>>();

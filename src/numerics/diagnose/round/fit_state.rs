@@ -7,7 +7,7 @@ use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
-use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened};
+use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen};
 use crate::robot::Measurements;
 use std::ops::Range;
 
@@ -25,6 +25,11 @@ impl FitState {
     /// The rows with the model fitted to them.
     pub fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
         Session { data: &fitter.data, rows: &self.screening.kept, model: &self.model, fitted: &self.fitted }
+    }
+
+    /// Whether any of its causes follows time.
+    pub fn follows_time(&self) -> bool {
+        self.causes.iter().any(|cause| cause.form.variables().contains(&Variable::Time))
     }
 
     /// The squared size of some causes together in their own uncertainty, a mean over their numbers; 0 where none of these is estimated,
@@ -56,8 +61,8 @@ pub(crate) struct Fitter<'a> {
     pub data: Measurements,
     /// What errors of rows are compared and told in.
     pub scale: ErrorScale,
-    /// Base parameters to estimate, all of them if `None`.
-    free: Option<Vec<usize>>,
+    /// Base parameters to estimate, in order of precedence; at first all.
+    free: Vec<usize>,
     pub repeatability: JointRepeatability,
     /// What a deviation of the joints makes of every row's readings.
     spread: JointSpread,
@@ -82,7 +87,7 @@ impl<'a> Fitter<'a> {
             question,
             data: question.data.clone(),
             scale: ErrorScale::of(question.data, question.fit),
-            free: None,
+            free: Vec::new(),
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: JointSpread::default(),
             repeated: 0.0,
@@ -94,7 +99,7 @@ impl<'a> Fitter<'a> {
         };
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
         let mut now = fitter.fit(&base, Vec::new());
-        fitter.free = Some(now.fitted.free());
+        fitter.follow(&now);
         fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let kept = &now.screening.kept;
         let shown = RepeatPairs::of(&fitter.data, kept).noise(&now.model, &fitter.data, &fitter.spread);
@@ -129,7 +134,20 @@ impl<'a> Fitter<'a> {
 
     /// Base parameters that are estimated.
     pub fn free(&self) -> &[usize] {
-        self.free.as_deref().unwrap_or_default()
+        &self.free
+    }
+
+    /// Adds the base parameters that the rows show around a fitted model: beside a large effect that the model lacked they could not be seen.
+    pub fn follow(&mut self, state: &FitState) {
+        let first = state.ranges.first().map_or(state.model.x.len(), |range| range.start);
+        if self.free.is_empty() {
+            self.free = state.fitted.free();
+        }
+        let others = (0..first).filter(|k| !self.free.contains(k));
+        let candidates: Vec<usize> = self.free.iter().copied().chain(others).collect();
+        let options = FitOptions { rows: &state.screening.kept, candidates: &candidates };
+        let more = seen(&state.model, &self.data, &state.fitted, &options);
+        self.free.extend(more.into_iter().filter(|k| !self.free.contains(k)).collect::<Vec<_>>());
     }
 
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
@@ -188,7 +206,7 @@ impl<'a> Fitter<'a> {
         let (start, ranges) = with_causes(from, &causes);
         let first = ranges.first().map_or(start.x.len(), |range| range.start);
         let all: Vec<usize> = (0..first).collect();
-        let base = self.free.as_ref().unwrap_or(&all);
+        let base = if self.free.is_empty() { &all } else { &self.free };
         let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
         let options = FitOptions { rows: self.question.fit, candidates: &candidates };
         let (model, fitted, screening) = fit_screened(&start, &self.data, &options, self.question.set);

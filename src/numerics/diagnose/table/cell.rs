@@ -2,6 +2,7 @@
 
 use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, STEPS};
 use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Term, Unknown, Variable, names};
+use nalgebra::Vector3;
 use std::f64::consts::PI;
 
 /// A cause at a place, whatever its shape.
@@ -103,6 +104,13 @@ impl FreeShape {
         Term::new(&Unknown, self.motion, law).into()
     }
 
+    /// The same with other numbers in its variables (a time, a limit, a direction); steps halve with the level. Empty where they have none.
+    pub fn near(&self, level: i32) -> Vec<Self> {
+        let first = near(self.of, level).into_iter().map(|of| Self { of, ..*self });
+        let Over::Product(other) = self.over else { return first.collect() };
+        first.chain(near(other, level).into_iter().map(|other| Self { over: Over::Product(other), ..*self })).collect()
+    }
+
     /// Its curves at all correlation lengths.
     pub fn curves(&self, values: &dyn Fn(Variable) -> Option<Vec<f64>>) -> Vec<ShapeGroup> {
         let (Over::Curve { count, lengths, .. }, Some(values)) = (self.over, values(self.of)) else { return Vec::new() };
@@ -116,7 +124,7 @@ impl FreeShape {
         }]
     }
 
-    fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
+    pub fn groups(&self, survey: &Survey, values: &dyn Fn(Variable) -> Option<Vec<f64>>, closely: bool) -> Vec<ShapeGroup> {
         let fields = fields(self.motion);
         match self.over {
             Over::Step => {
@@ -175,6 +183,27 @@ impl FreeShape {
                 vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]
             }
         }
+    }
+}
+
+/// A variable with other numbers.
+fn near(of: Variable, level: i32) -> Vec<Variable> {
+    let step = libm::exp2(-f64::from(level));
+    let scales = [libm::exp2(step), libm::exp2(-step)];
+    let turned = |along: [f64; 3]| {
+        let along = Vector3::from(along);
+        let across = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+        let angle = 0.4 * step;
+        [across, along.cross(&across)].into_iter().flat_map(move |across| {
+            [angle, -angle].map(|angle| (along * libm::cos(angle) + across * libm::sin(angle)).normalize().into())
+        })
+    };
+    match of {
+        Variable::Recent { joint, time } => scales.map(|scale| Variable::Recent { joint, time: time * scale }).to_vec(),
+        Variable::Stretch { joint, limit } => scales.map(|scale| Variable::Stretch { joint, limit: limit * scale }).to_vec(),
+        Variable::Position { along } => turned(along).map(|along| Variable::Position { along }).collect(),
+        Variable::Sighted { along } => turned(along).map(|along| Variable::Sighted { along }).collect(),
+        _ => Vec::new(),
     }
 }
 

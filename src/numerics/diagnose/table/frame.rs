@@ -69,6 +69,12 @@ impl<'a> SearchRows<'a> {
         out
     }
 
+    pub fn parts(&self) -> String {
+        let points = self.view.problem.of_readings().len();
+        let sum = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        format!("points {} of {} currents {} of {} raw {} factor {:?} model {}", sum(&self.residual[..points]), points, sum(&self.residual[points..]), self.residual.len() - points, sum(&self.view.problem.residual[points..]), self.noise.currents, sum(&self.view.problem.residual[..points]))
+    }
+
     pub fn residual_rows(&self) -> usize {
         self.residual.len()
     }

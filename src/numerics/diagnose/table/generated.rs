@@ -3,7 +3,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, OPEN, PRODUCT, UNNAMED, USUAL};
+use crate::criteria::cells::{FADING, LIMITS, OPEN, PAIR, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_brought;
@@ -43,7 +43,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
-    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN;
+    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN || std::env::var("NOFREE").is_ok();
     let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
         let families = families(place, survey);
@@ -75,10 +75,9 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
 /// Products of a motion's variable that shows with every other one that it may follow.
 pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchRows) -> Vec<CauseCell> {
     let mut out: Vec<CauseCell> = Vec::new();
-    for FreeShape { motion, of, .. } in shown {
+    for FreeShape { motion, of, .. } in shown.iter().filter(|_| std::env::var("NOFREE").is_err()) {
         let kinds = kinds(motion.place(), *motion, survey);
-        let single = kinds.into_iter().filter(|kind| kind.len() < survey.joints() + 2).flatten();
-        let others: Vec<Variable> = single.map(|(other, _)| other).filter(|other| other != of).collect();
+        let others: Vec<Variable> = kinds.into_iter().flatten().map(|(other, _)| other).filter(|other| other != of).collect();
         frame.prepare(&[*motion], &others);
         let mut seen: Vec<Variable> = Vec::new();
         for other in others {
@@ -94,6 +93,53 @@ pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchR
         }
     }
     out
+}
+
+/// Products of all pairs of variables that a motion may follow, of which neither need show by itself: one of what sits at a joint is that
+/// joint's own.
+pub(super) fn pairs(survey: &Survey, frame: &mut SearchRows) -> Vec<FreeShape> {
+    let mut out = Vec::new();
+    for place in places(survey) {
+        for motion in families(place, survey).into_iter().flatten() {
+            let kinds = kinds(place, motion, survey);
+            let mut variables: Vec<Variable> = Vec::new();
+            for of in kinds.into_iter().filter(|kind| kind.len() <= survey.joints()).flatten().map(|(of, _)| of) {
+                if frame.values(of).is_some_and(|values| super::cell::line(&values).is_some())
+                    && !variables.iter().any(|known| is_alike(*known, of))
+                {
+                    variables.push(of);
+                }
+            }
+            frame.prepare(&[motion], &variables);
+            let own = |of: &Variable| match place {
+                Place::Joint(joint) | Place::Links(joint, _) => joint_of(*of) == Some(joint),
+                _ => true,
+            };
+            for (i, of) in variables.iter().enumerate().filter(|(_, of)| own(of)) {
+                let others = variables.iter().enumerate().filter(|(k, other)| *k != i && (*k > i || !own(other)));
+                out.extend(others.map(|(_, other)| FreeShape { motion, of: *of, over: Over::Product(*other) }));
+            }
+        }
+    }
+    out
+}
+
+/// The joint that a variable is of.
+fn joint_of(of: Variable) -> Option<usize> {
+    match of {
+        Variable::Angle { joint }
+        | Variable::Approach { joint }
+        | Variable::Move { joint }
+        | Variable::Load { joint }
+        | Variable::Stretch { joint, .. }
+        | Variable::Recent { joint, .. } => Some(joint),
+        _ => None,
+    }
+}
+
+/// Cells of products that were seen among all pairs.
+pub(super) fn pair_cells(seen: &[FreeShape]) -> Vec<CauseCell> {
+    seen.iter().map(|free| cell(*free, PAIR.ln())).collect()
 }
 
 /// Whether two variables are one with another number.
@@ -175,8 +221,11 @@ fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
         out.push(arrows.map(|along| (Variable::Position { along }, SLOW)).to_vec());
         let limits = LIMITS.map(|share| Variable::Stretch { joint: own, limit: share * survey.travel(own) });
         out.push(limits.map(|of| (of, SLOW)).to_vec());
+        let other = |joint: usize| Variable::Stretch { joint, limit: LIMITS[1] * survey.travel(joint) };
+        out.push(others().map(|joint| (other(joint), SLOW)).collect());
         if survey.data.has_clock() {
             out.push(FADING.map(|time| (Variable::Recent { joint: own, time }, SLOW)).to_vec());
+            out.push(others().map(|joint| (Variable::Recent { joint, time: FADING[1] }, SLOW)).collect());
         }
     }
     if place == Place::Tool {

@@ -18,7 +18,7 @@ pub(crate) use answer::{Answer, FoundCell};
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
-use crate::criteria::cells::{IDLE, ROUNDS};
+use crate::criteria::cells::{IDLE, ROUNDS, UNEXPLAINED};
 use crate::effect::{Basis, Form, Law, Motion, Place, Variable, names};
 use crate::estimate::Prior;
 use crate::observation::only_brought;
@@ -33,6 +33,8 @@ pub(crate) struct Rounds {
     /// Components with the keys of their cells.
     components: Vec<(String, Component)>,
     shown: Vec<FreeShape>,
+    /// Products of two variables that show together; none before they were looked for.
+    pairs: Option<Vec<FreeShape>>,
     first: Option<(Located, f64)>,
     round: usize,
 }
@@ -78,7 +80,9 @@ impl Rounds {
             let is_slow = || cell.groups(&survey, &values, false).iter().any(|group| group.forms.iter().any(slow));
             !(unseen || fitter.causes_of_the_arm_first() && is_slow())
         };
-        let mut table = CauseTable::new(&mut frame, &survey, question, &self.shown, keeps);
+        let all_pairs = if self.pairs.is_none() { generated::pairs(&survey, &mut frame) } else { Vec::new() };
+        let products = (&self.shown[..], self.pairs.as_deref().unwrap_or_default());
+        let mut table = CauseTable::new(&mut frame, &survey, question, products, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         let mut components = Vec::new();
@@ -105,6 +109,19 @@ impl Rounds {
             components = table.grow(components);
             components = table.periodic(components);
         }
+        if std::env::var("DBG").is_ok() {
+            let all: Vec<&Component> = components.iter().collect();
+            let state = table.state(&all, None);
+            eprintln!("ROUND square {:.1} freedom {:.1} {}", state.rows.square, state.rows.freedom, table.frame.parts());
+            eprintln!("ROUND {} kappa {:.3} cells {} columns {} cpu {:.2}", self.round, state.kappa, table.cells.len(), table.first.last().unwrap_or(&0), cpu());
+            for (i, own) in components.iter().enumerate() {
+                let others = search::without(&components, &[i]);
+                let rest: Vec<&Component> = others.iter().collect();
+                let st = table.state(&rest, Some(state.kappa));
+                let log = table.log_evidence(own, &st, &rest);
+                eprintln!("   {:60} um {:8.2} log {:8.1} prior {:5.1} cols {} part {} {}", table.cells[own.cell].key, own.amplitude * 1e6, log, table.cells[own.cell].log_prior, own.values.ncols(), own.part.ncols(), own.forms.iter().map(|f| f.key()).collect::<Vec<_>>().join(" + "));
+            }
+        }
         let keys: Vec<String> = components.iter().map(|own| table.cells[own.cell].key.clone()).collect();
         let sorted = |keys: &[String]| {
             let mut keys = keys.to_vec();
@@ -113,7 +130,15 @@ impl Rounds {
         };
         let shown = table.shown(&components);
         let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
-        let is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
+        let mut is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
+        if is_last && self.pairs.is_none() {
+            let all: Vec<&Component> = components.iter().collect();
+            let state = table.state(&all, None);
+            let unexplained = state.kappa > *UNEXPLAINED && !brought;
+            let seen = if unexplained { table.seen_pairs(&all_pairs, &state, &all) } else { Vec::new() };
+            is_last = seen.is_empty();
+            self.pairs = Some(seen);
+        }
         let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
@@ -183,4 +208,10 @@ fn without_idle_waves(form: &Form, count: usize, seen: &dyn Fn(usize) -> bool) -
         (0..fields).flat_map(|field| (0..last).map(move |wave| field * waves + wave)).collect()
     };
     (Form::from(term.with(law)), kept)
+}
+
+pub(super) fn cpu() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<f64> = text.rsplit(')').next().unwrap_or("").split_whitespace().filter_map(|t| t.parse().ok()).collect();
+    (fields.get(10).unwrap_or(&0.0) + fields.get(11).unwrap_or(&0.0)) / 100.0
 }

@@ -1,11 +1,11 @@
 //! All cells of a recording with their columns, and what each of them says beside the components of a model.
 
-use super::cell::{CauseCell, FreeShape};
+use super::cell::{CauseCell, FreeShape, ShapeGroup, Shapes, fields};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, product, view};
 use super::state::{CellColumns, Component, KnownState, PartProducts};
 use super::{generated, listed};
-use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, LEVELS, UNLIKELY};
+use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, LEVELS, PAIR, PAIRS, UNLIKELY};
 use crate::diagnose::types::Question;
 use crate::effect::{Basis, Form, Survey, Variable, cause};
 use nalgebra::DMatrix;
@@ -46,8 +46,11 @@ pub(super) struct CellEvidence {
     pub shape: (usize, usize),
     pub amplitude: f64,
     /// The shape with its numbers where they say most, with ln of its evidence and its amplitude.
-    pub refined: Option<(Form, f64, f64)>,
+    pub refined: Option<Refined>,
 }
+
+/// A shape with the numbers of which the rows say most: its forms, ln of its evidence, its amplitude.
+type Refined = (Vec<Form>, f64, f64);
 
 /// ln of posterior odds of every cell beside a state.
 pub(super) struct CellScan {
@@ -72,11 +75,13 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         frame: &'f mut SearchRows<'a>,
         survey: &'f Survey<'f>,
         question: &Question,
-        shown: &[FreeShape],
+        (shown, pairs): (&[FreeShape], &[FreeShape]),
         keeps: impl Fn(&CauseCell) -> bool,
     ) -> Self {
         let mut cells = generated::cells(survey, frame, question);
         cells.extend(generated::products(shown, survey, frame));
+        let known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
+        cells.extend(generated::pair_cells(pairs).into_iter().filter(|cell| !known.contains(&cell.key)));
         let values = |of: Variable| frame.values(of);
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);
@@ -319,16 +324,16 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         scan
     }
 
-    /// Gives listed shapes that are near the best cell the numbers that say most: a free curve has no numbers to be refined.
+    /// Gives the best cell, and listed shapes near it, the numbers that say most.
     fn refine(&self, scan: &mut CellScan, state: &KnownState, components: &[&Component], prior: &(dyn Fn(usize) -> f64 + Sync)) {
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
         let best = scan.best();
         let open = best.is_some_and(|best| !self.cells[best].is_named());
         let near = |cell: &usize| open && scan.log_odds[*cell] > most - (0.2 * most).max(10.0) && scan.log_odds[*cell] > -5.0;
         let named =
-            |cell: &usize| self.declared.contains(cell) || self.cells[*cell].is_named() && (Some(*cell) == best || near(cell));
+            |cell: &usize| Some(*cell) == best || self.declared.contains(cell) || self.cells[*cell].is_named() && near(cell);
         let listed: Vec<usize> = scan.closely.keys().copied().filter(named).collect();
-        let refined: Vec<(usize, (Form, f64, f64))> = listed
+        let refined: Vec<(usize, Refined)> = listed
             .into_par_iter()
             .filter_map(|cell| Some((cell, self.refined(cell, &scan.closely[&cell], state, components)?)))
             .collect();
@@ -342,14 +347,30 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
     }
 
+    /// Those of some products that a state shows, the most probable first.
+    pub fn seen_pairs(&self, pairs: &[FreeShape], state: &KnownState, components: &[&Component]) -> Vec<FreeShape> {
+        let values = |of: Variable| self.frame.values(of);
+        let log = |free: &FreeShape| {
+            let block = CellColumns::of(free.groups(self.survey, &values, false), self.frame);
+            let across = self.across_block(&block, state, components);
+            let mut logs = Vec::new();
+            state.shapes(&block, &across, 0, |_, _, found| logs.push(found.log));
+            log_sum(&logs)
+        };
+        let seen = pairs.par_iter().map(|free| (log(free), *free)).filter(|(log, _)| log + PAIR.ln() > *JOINS);
+        let mut seen: Vec<(f64, FreeShape)> = seen.collect();
+        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+        seen.into_iter().take(*PAIRS).map(|(_, free)| free).collect()
+    }
+
     /// The component that a cell is in a scan.
     pub fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
         let own = self.as_found(cell, found);
-        let Some((form, _, amplitude)) = found.refined.clone() else {
+        let Some((forms, _, amplitude)) = found.refined.clone() else {
             self.next += 1;
             return own.with_part(self.next);
         };
-        let own = Component { forms: vec![form], amplitude, ..own };
+        let own = Component { forms, amplitude, ..own };
         self.component_of(&own, cell)
     }
 
@@ -411,46 +432,86 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
-    pub fn refined(
-        &self,
-        cell: usize,
-        found: &CellEvidence,
-        state: &KnownState,
-        others: &[&Component],
-    ) -> Option<(Form, f64, f64)> {
-        let mut best = self.as_found(cell, found);
-        let [form] = &best.forms[..] else { return None };
-        let mut form = form.clone();
-        if form.cause().is_nameless() {
-            return None;
-        }
+    pub fn refined(&self, cell: usize, found: &CellEvidence, state: &KnownState, others: &[&Component]) -> Option<Refined> {
+        let best = self.as_found(cell, found);
         let keys: BTreeSet<String> = others.iter().flat_map(|own| &own.forms).map(Form::key).collect();
-        let (mut log, mut amplitude) = self.of_component(&best, state, others)?;
-        let mut moved = false;
-        for level in 0..*LEVELS {
-            loop {
-                let near = form.near(self.survey, level);
-                let tried = near.into_iter().filter(|near| !keys.contains(&near.key())).filter_map(|near| {
-                    let other = self.with_forms(&best, vec![near.clone()]);
-                    self.of_component(&other, state, others).map(|(log, amplitude)| (log, amplitude, near))
-                });
-                let leaves_whole = |near: &Form| is_whole_order(&form) && !is_whole_order(near);
-                let paid = |(log, _, near): &(f64, f64, Form)| log - if leaves_whole(near) { *BENDS } else { 0.0 };
-                let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else { break };
-                if paid(&next) <= log + 1e-6 {
-                    break;
-                }
-                let gained = next.0 - log;
-                (log, amplitude, form) = next;
-                best.forms = vec![form.clone()];
-                moved = true;
-                if gained < 0.05 {
-                    break;
-                }
+        let value = |forms: &[Form]| {
+            let other = self.with_forms(&best, forms.to_vec());
+            self.of_component(&other, state, others)
+        };
+        let is_there = |forms: &[Form]| forms.iter().any(|form| keys.contains(&form.key()));
+        let start = self.of_component(&best, state, others)?;
+        match (&self.cells[cell].shapes, &best.forms[..]) {
+            (Shapes::Free(free), _) => {
+                let values = |of: Variable| self.frame.values(of);
+                let near = |free: &FreeShape, level| {
+                    let forms = |free: FreeShape| {
+                        let groups = free.groups(self.survey, &values, true);
+                        let group = groups.get(found.shape.0)?;
+                        Some((free, self.forms_of(group, found.shape.1)))
+                    };
+                    free.near(level).into_iter().filter_map(forms).filter(|(_, forms)| !is_there(forms)).collect::<Vec<_>>()
+                };
+                let refined = climb(*free, start, &near, &|(_, forms)| value(forms), &|_, _| 0.0)?;
+                let forms = self.forms_of(refined.0.groups(self.survey, &values, true).get(found.shape.0)?, found.shape.1);
+                Some((forms, refined.1, refined.2))
+            }
+            (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
+                let near = |form: &Form, level| {
+                    let near = form.near(self.survey, level).into_iter().map(|near| (near.clone(), vec![near]));
+                    near.filter(|(_, forms)| !is_there(forms)).collect::<Vec<_>>()
+                };
+                let price = |form: &Form, near: &Form| if is_whole_order(form) && !is_whole_order(near) { *BENDS } else { 0.0 };
+                let (form, log, amplitude) = climb(form.clone(), start, &near, &|(_, forms)| value(forms), &price)?;
+                Some((vec![form], log, amplitude))
+            }
+            _ => None,
+        }
+    }
+
+    /// The forms of a shape of a group: those that it gives a share.
+    fn forms_of(&self, group: &ShapeGroup, shape: usize) -> Vec<Form> {
+        let mut at = 0;
+        let shares = &group.shapes[shape].shares;
+        let mut out = Vec::new();
+        for form in &group.forms {
+            let count = form.term().map_or(0, |term| fields(term.motion()) * term.law().count());
+            let own = shares.get(at..at + count).unwrap_or_default();
+            at += count;
+            if own.is_empty() || own.iter().any(|share| *share > 0.0) {
+                out.push(form.clone());
             }
         }
-        moved.then_some((form, log, amplitude))
+        out
     }
+}
+
+/// Steps from a shape to the best near it, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none
+/// if that is the first. `price` is what a step costs.
+fn climb<T: Clone>(
+    first: T,
+    start: (f64, f64),
+    near: &dyn Fn(&T, i32) -> Vec<(T, Vec<Form>)>,
+    value: &dyn Fn(&(T, Vec<Form>)) -> Option<(f64, f64)>,
+    price: &dyn Fn(&T, &T) -> f64,
+) -> Option<(T, f64, f64)> {
+    let (mut now, (mut log, mut amplitude), mut moved) = (first, start, false);
+    for level in 0..*LEVELS {
+        loop {
+            let tried = near(&now, level).into_iter().filter_map(|other| value(&other).map(|(log, amplitude)| (log, amplitude, other.0)));
+            let paid = |(log, _, other): &(f64, f64, T)| log - price(&now, other);
+            let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else { break };
+            if paid(&next) <= log + 1e-6 {
+                break;
+            }
+            let gained = next.0 - log;
+            (log, amplitude, now, moved) = (next.0, next.1, next.2, true);
+            if gained < 0.05 {
+                break;
+            }
+        }
+    }
+    moved.then_some((now, log, amplitude))
 }
 
 /// Whether a form is a wave of whole periods a turn.

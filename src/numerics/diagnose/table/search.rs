@@ -269,7 +269,10 @@ impl CauseTable<'_, '_> {
         let most = components.iter().map(|own| own.amplitude).fold(0.0, f64::max);
         for own in components.iter().filter(|own| own.amplitude > 2.0 * *TRACE * most) {
             let free = match &self.cells[own.cell].shapes {
-                Shapes::Free(free) if !matches!(free.over, Over::Product(_)) => Some(*free),
+                Shapes::Free(free) if !matches!(free.over, Over::Product(_)) => {
+                    let refined = own.forms.first().and_then(|form| Some(form.term()?.law().first.of));
+                    Some(FreeShape { of: refined.unwrap_or(free.of), ..*free })
+                }
                 Shapes::Free(_) => None,
                 Shapes::Listed(_) => own.forms.first().and_then(|form| {
                     let term = form.term().filter(|term| term.law().times.is_none())?;

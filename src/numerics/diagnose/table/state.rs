@@ -245,7 +245,8 @@ impl KnownState {
         let left = (rows.square - solved_along.norm_squared()).max(0.0) / square;
         Self {
             kappa: square.sqrt(),
-            rows: EvidenceRows { square: left, ..rows },
+            // Rows that leave less than the least noise do not make it smaller.
+            rows: EvidenceRows { square: left, freedom: rows.freedom.min(left) },
             components: components.iter().map(|own| own.id).collect(),
             lower,
             along: solved_along,
