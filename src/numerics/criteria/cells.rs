@@ -51,6 +51,8 @@ criteria! {
     SETTLED: f64 = 0.3, "probability", "judgement: no cell that would have joined", "";
     /// Share of the strongest finding anywhere below which what has no name is a detail of that.
     TRACE: f64 = 0.015, "share", "physics: no law is met to a hundredth", "";
+    /// Share of the ln of evidence of the strongest finding below which what has no name is a detail of that.
+    FAINT: f64 = 0.015, "share", "count: a shape that is met to an eighth of its size leaves a sixty-fourth of its square", "";
     /// What a motion leaves of the second order: this times its square.
     SECOND_ORDER: f64 = 0.5, "1/m", "physics: half of the square of a motion over the reach of an arm, a metre", "";
     /// Components of a model at most.

@@ -77,7 +77,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         // time may be that noise.
         let settled = answer.nothing_last > *SETTLED;
         let asked = settled || fitter.data.in_motion(&next.screening.kept) || next.follows_time();
-        if let Some(change) = asked.then(|| correlation_left_by(&next, &fitter)).flatten() {
+        if let Some(change) = asked.then(|| correlation_left_by(&next, &answer, &fitter)).flatten() {
             let kept = fitter.take_correlation(&change, &next);
             tell(words::of_the_correlation(&fitter));
             now = fitter.fit(&next.model, kept);

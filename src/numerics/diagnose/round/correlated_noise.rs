@@ -8,6 +8,8 @@ use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
 use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
+use crate::criteria::cells::SETTLED;
+use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
@@ -17,7 +19,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::prelude::*;
 
 /// What noise does from row to row, if the settled model shows it to be otherwise than believed.
-pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<CorrelationChange> {
+pub(crate) fn correlation_left_by(settled: &FitState, answer: &Answer, fitter: &Fitter) -> Option<CorrelationChange> {
     let change = |noise| CorrelationChange { noise, keeps_causes: false };
     if !fitter.may_estimate_correlation(settled) {
         return None;
@@ -27,14 +29,13 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     // Rows that measured different numbers have no one correlation from each to the next.
     let width = problem.width()?;
     let slow: Vec<bool> = settled.causes.iter().map(|cause| follows_time(&cause.form)).collect();
-    let numbers = |(cause, slow): (&_, &bool)| if *slow { numbers(cause) } else { 0 };
-    let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().zip(&slow).map(numbers).sum::<usize>() as f64;
+    let price = price_of(&answer.found, &|i| slow[i]);
     let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
-        let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().map(self::numbers).sum::<usize>() as f64;
+        let price = price_of(&answer.found, &|_| true);
         let (alone, of_noise) = Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()]).likeliest();
         let keeps_causes = best + price < alone - *PLAIN;
         return Some(CorrelationChange { noise: if keeps_causes { noise } else { of_noise }, keeps_causes });
@@ -43,7 +44,12 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        if cost < best.min(believed) + *CLEARER && other.is_some() {
+        if std::env::var("DBG").is_ok() {
+            eprintln!("T noise alone {cost:.1} {other:?} with all {best:.1} believed {believed:.1} price {price:.1} clearer {}", *CLEARER);
+        }
+        // Causes that were not found yet look like such noise, too.
+        let clearer = if answer.nothing_last > *SETTLED { *CLEARER } else { 10.0 * *CLEARER };
+        if cost + clearer < best.min(believed) && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
     }
@@ -63,9 +69,10 @@ fn follows_time(form: &Form) -> bool {
     form.variables().contains(&Variable::Time)
 }
 
-/// Coefficients, and one shape.
-fn numbers(cause: &super::fit_state::EstimatedCause) -> usize {
-    cause.coefficients.len() + 1
+/// What the freedom of some findings costs them, -2 ln of evidence: by how much less they are worth than they explain.
+fn price_of(found: &[FoundCell], of: &dyn Fn(usize) -> bool) -> f64 {
+    let of = found.iter().filter(|found| found.members.iter().any(|i| of(*i)));
+    of.map(|found| (found.gain - 2.0 * found.log).max(0.0)).sum()
 }
 
 /// Points by the base model and some causes, in a linear picture.

@@ -157,7 +157,7 @@ impl FreeShape {
             }
             Over::Product(other) => {
                 let factors = [self.of, other].map(|of| {
-                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { EACH[2] }))
+                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { ROUGHLY }))
                 });
                 let [Some(a), Some(b)] = factors else { return Vec::new() };
                 let form = self.term(Law::new(self.of, a).times(other, b));
@@ -170,6 +170,7 @@ impl FreeShape {
                         }
                     }
                 };
+                let lengths = &LENGTHS[..2];
                 let shape = |length: f64| {
                     let [first, second] = [a, b].map(|basis| spectrum(basis, length));
                     let mut shares: Vec<f64> = first.iter().flat_map(|x| second.iter().map(move |y| x * y)).collect();
@@ -177,14 +178,17 @@ impl FreeShape {
                     shares[0] = 0.0;
                     let sum: f64 = shares.iter().sum();
                     let shares = shares.into_iter().map(|share| share / sum).collect();
-                    CellShape { shares: over_fields(shares, self.motion, fields), log_weight: -2.0_f64.ln(), is_bent: false }
+                    CellShape { shares: over_fields(shares, self.motion, fields), log_weight: -(lengths.len() as f64).ln(), is_bent: false }
                 };
-                let shapes = [1.0, 0.35].map(shape).to_vec();
+                let shapes = lengths.iter().copied().map(shape).collect();
                 vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]
             }
         }
     }
 }
+
+/// Functions of each of two variables where products are looked at for the first time.
+const ROUGHLY: usize = 4;
 
 /// A variable with other numbers.
 fn near(of: Variable, level: i32) -> Vec<Variable> {

@@ -12,6 +12,9 @@ use nalgebra::{DMatrix, DVector};
 /// Amplitudes of the grid.
 pub(super) const AMPLITUDES: usize = 28;
 
+/// Sum of the eigenvalues of a^2 X'X beyond which rounding decides on the smallest of them.
+const EXACT: f64 = 1e12;
+
 /// How much the rows say: degrees of freedom and the squared residual, in standard deviations of the noise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EvidenceRows {
@@ -58,10 +61,16 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f
     let (whole, half) = (*NU + rows.square, 0.5 * (rows.freedom + *NU));
     let (mut logs, mut fits) = ([0.0; AMPLITUDES], [0.0; AMPLITUDES]);
     for ((log, fit_there), amplitude) in logs.iter_mut().zip(&mut fits).zip(amplitudes()) {
-        let (fit, determinant) = at_amplitude(amplitude * amplitude, diagonal, beside, along);
+        let square = amplitude * amplitude;
+        let (fit, determinant) = at_amplitude(square, diagonal, beside, along);
         *fit_there = fit;
-        // Rounding may make a fit larger than all that there is.
-        *log = -0.5 * determinant - half * (1.0 - (fit / whole).min(1.0 - 1e-9)).ln();
+        // Noise is always left: what leaves none is rounding.
+        let left = 1.0 - fit / whole;
+        let sound = left > 1e-9 && square * trace < EXACT;
+        *log = if sound { -0.5 * determinant - half * left.ln() } else { f64::NEG_INFINITY };
+    }
+    if logs.iter().all(|log| *log == f64::NEG_INFINITY) {
+        return GroupEvidence::NONE;
     }
     let best = (0..AMPLITUDES).max_by(|a, b| logs[*a].total_cmp(&logs[*b])).unwrap_or(0);
     GroupEvidence { log: log_mean(&logs), amplitude: amplitudes().nth(best).unwrap_or(*SMALLEST), fit: fits[best] }

@@ -80,8 +80,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     ) -> Self {
         let mut cells = generated::cells(survey, frame, question);
         cells.extend(generated::products(shown, survey, frame));
-        let known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
-        cells.extend(generated::pair_cells(pairs).into_iter().filter(|cell| !known.contains(&cell.key)));
+        let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
+        cells.extend(generated::pair_cells(pairs).into_iter().filter(|cell| known.insert(cell.key.clone())));
         let values = |of: Variable| frame.values(of);
         let mut named = listed::cells(survey, &values, question);
         named.append(&mut cells);

@@ -3,7 +3,7 @@
 use super::faults::{faults, rows_apart};
 use super::last_round::LastRound;
 use super::rivals::share_with_identities;
-use crate::criteria::cells::{DETAIL, TRACE};
+use crate::criteria::cells::{DETAIL, FAINT, TRACE};
 use crate::criteria::words::FIRM;
 use crate::diagnose::round::FitState;
 use crate::diagnose::table::FoundCell;
@@ -40,12 +40,14 @@ pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
 fn without_details(last: &LastRound) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
+    let strongest = all.iter().map(|(_, found, _)| found.log).fold(0.0, f64::max);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
         let first = (found.effect == names::UNKNOWN).then(|| {
             let here = out.iter().position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
-            here.or_else(|| out.first().filter(|(most, ..)| rms < *TRACE * most).map(|_| 0))
+            let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| rms < *TRACE * most || found.log < *FAINT * strongest;
+            here.or_else(|| out.first().filter(trace).map(|_| 0))
         });
         match first.flatten() {
             Some(main) => out[main].2.extend(&found.members),
