@@ -69,10 +69,10 @@ fn follows_time(form: &Form) -> bool {
     form.variables().contains(&Variable::Time)
 }
 
-/// What the freedom of some findings costs them, -2 ln of evidence: by how much less they are worth than they explain.
+/// What the freedom of some findings costs them, -2 ln of evidence.
 fn price_of(found: &[FoundCell], of: &dyn Fn(usize) -> bool) -> f64 {
     let of = found.iter().filter(|found| found.members.iter().any(|i| of(*i)));
-    of.map(|found| (found.gain - 2.0 * found.log).max(0.0)).sum()
+    of.map(|found| found.price).sum()
 }
 
 /// Points by the base model and some causes, in a linear picture.

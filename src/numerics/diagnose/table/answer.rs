@@ -7,7 +7,7 @@ use super::listed::cell_of;
 use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
-use crate::criteria::cells::{MISLED, RIVAL};
+use crate::criteria::cells::{MISLED, NU, RIVAL};
 use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
 use std::collections::BTreeMap;
@@ -21,6 +21,8 @@ pub(crate) struct FoundCell {
     pub members: Vec<usize>,
     /// ln of the evidence for it beside all others.
     pub log: f64,
+    /// What its freedom costs: by how much -2 ln of its evidence is more than that of its best fit.
+    pub price: f64,
     /// Fall of the squared residual in standard deviations, and by how many numbers.
     pub gain: f64,
     pub numbers: usize,
@@ -117,12 +119,16 @@ impl CauseTable<'_, '_> {
         for i in members {
             bounds.extend(components[*i].forms.iter().map(|_| (components[*i].group.positive, components[*i].group.largest)));
         }
+        let gain = (state.rows.square - with.rows.square).max(0.0);
+        let whole = *NU + state.rows.square;
+        let best = -(state.rows.freedom + *NU) * (1.0 - gain / whole).max(f64::MIN_POSITIVE).ln();
         FoundCell {
             effect,
             place,
             members: Vec::new(),
             log,
-            gain: (state.rows.square - with.rows.square).max(0.0),
+            price: (best - 2.0 * log).max(0.0),
+            gain,
             numbers: members.iter().map(|i| components[*i].part.ncols()).sum(),
             probabilities,
             rivals,

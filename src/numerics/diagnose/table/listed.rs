@@ -122,15 +122,6 @@ fn curves(
     values: &dyn Fn(Variable) -> Option<Vec<f64>>,
     joints: usize,
 ) -> Vec<ShapeGroup> {
-    if name == names::TRACKER_DRIFT {
-        // Any smooth course of the whole instrument in time.
-        let motion = groups.iter().flat_map(|group| &group.forms).find_map(|form| Some(form.term()?.motion()));
-        let of = Variable::Time;
-        let smooth = |motion| FreeShape { motion, of, over: Over::Curve { count: 8, first: 8, lengths: 2 } }.curves(values);
-        let mut out: Vec<ShapeGroup> = motion.map(smooth).unwrap_or_default();
-        out.iter_mut().flat_map(|group| &mut group.shapes).for_each(|shape| shape.log_weight = 0.15_f64.ln());
-        return out;
-    }
     let Place::Joint(joint) = place else { return Vec::new() };
     let (motion, load) = (Motion::Joint { joint }, Variable::Load { joint });
     match name {

@@ -62,6 +62,7 @@ impl Rounds {
     /// Searches around a fitted model.
     pub fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
         self.round += 1;
+        if std::env::var("DBG").is_ok() { eprintln!("T time begin {:.2}", cpu()); }
         let survey = view.survey();
         let noise = if self.round > 1 {
             NoiseShape::of(view, fitter.data.rows())
@@ -69,6 +70,7 @@ impl Rounds {
             NoiseShape::at_first(view, fitter.data.rows())
         };
         let mut frame = SearchRows::of(view, now, fitter, noise);
+        if std::env::var("DBG").is_ok() { eprintln!("T time frame {:.2}", cpu()); }
         let question = fitter.question;
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
         let brought = only_brought(&fitter.data, question.fit);
@@ -85,6 +87,7 @@ impl Rounds {
         let mut table = CauseTable::new(&mut frame, &survey, question, products, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
+        if std::env::var("DBG").is_ok() { eprintln!("T time table {:.2}", cpu()); }
         let mut components = Vec::new();
         for (key, own) in std::mem::take(&mut self.components) {
             if let Some(cell) = table.cell(&key) {
@@ -98,16 +101,22 @@ impl Rounds {
         }
         let has_begun = !components.is_empty();
         components = if has_begun { table.backfit(components, 1) } else { table.start() };
+        if std::env::var("DBG").is_ok() { eprintln!("T time start {:.2}", cpu()); }
         // Joints that yield come first: masses and currents speak of what yields in the model, and large motions are not linear.
         let waits = !has_begun && !components.is_empty() && self.round < *ROUNDS;
         if !waits {
             components = table.grow(components);
+            if std::env::var("DBG").is_ok() { eprintln!("T time grow {:.2}", cpu()); }
             components = table.prune(components);
+            if std::env::var("DBG").is_ok() { eprintln!("T time prune {:.2}", cpu()); }
         }
         if !waits && !components.is_empty() {
             components = table.swap(components);
+            if std::env::var("DBG").is_ok() { eprintln!("T time swap {:.2}", cpu()); }
             components = table.grow(components);
-            components = table.periodic(components);
+            if std::env::var("DBG").is_ok() { eprintln!("T time grow2 {:.2}", cpu()); }
+            components = table.by_several(components);
+            if std::env::var("DBG").is_ok() { eprintln!("T time periodic {:.2}", cpu()); }
         }
         if std::env::var("DBG").is_ok() {
             let all: Vec<&Component> = components.iter().collect();
@@ -140,6 +149,7 @@ impl Rounds {
             self.pairs = Some(seen);
         }
         let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
+        if std::env::var("DBG").is_ok() { eprintln!("T time answer {:.2}", cpu()); }
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();

@@ -1,13 +1,13 @@
 //! All cells of a recording with their columns, and what each of them says beside the components of a model.
 
-use super::cell::{CauseCell, FreeShape, ShapeGroup, Shapes, fields};
+use super::cell::{CauseCell, FreeShape, Over, ShapeGroup, Shapes, fields};
 use super::evidence::log_sum;
 use super::frame::{SearchRows, product, view};
 use super::state::{CellColumns, Component, KnownState, PartProducts};
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, LEVELS, PAIR, PAIRS, UNLIKELY};
 use crate::diagnose::types::Question;
-use crate::effect::{Basis, Form, Survey, Variable, cause};
+use crate::effect::{Basis, Form, Place, Survey, Variable, cause};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -212,6 +212,30 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             (0..self.cells.len()).into_par_iter().map(overlap).filter(|(share, _)| *share > *ALIKE).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         all.into_iter().take(most).map(|(_, cell)| cell).collect()
+    }
+
+    /// Cells over the variable of a component at its place or next to it: columns that are looked at coarsely do not show how alike fine curves are.
+    pub fn near(&self, own: &Component) -> Vec<usize> {
+        let of = |cell: &CauseCell| match &cell.shapes {
+            Shapes::Free(FreeShape { of, over: Over::Curve { .. }, .. }) => Some(*of),
+            Shapes::Free(_) => None,
+            Shapes::Listed(groups) => {
+                let form = groups.first().and_then(|group| group.forms.first());
+                form.and_then(|form| form.term()).filter(|term| term.law().times.is_none()).map(|term| term.law().first.of)
+            }
+        };
+        let joints = self.survey.joints();
+        let along = |place: Place| match place {
+            Place::Base => Some(0),
+            Place::Joint(joint) => Some(2 * joint + 1),
+            Place::Links(first, last) if first == last => Some(2 * first + 2),
+            Place::Tool => Some(2 * joints),
+            _ => None,
+        };
+        let cell = &self.cells[own.cell];
+        let (Some(variable), Some(place), Shapes::Free(_)) = (of(cell), along(cell.place), &cell.shapes) else { return Vec::new() };
+        let near = |other: &CauseCell| of(other) == Some(variable) && along(other.place).is_some_and(|at| place.abs_diff(at) <= 2);
+        (0..self.cells.len()).filter(|k| near(&self.cells[*k])).collect()
     }
 
     /// The same of a block's columns, from the components that the state has.

@@ -1,13 +1,13 @@
 //! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell beside all others.
 
-use super::cell::{CauseCell, FreeShape, Over, Shapes};
+use super::cell::{FreeShape, Over, Shapes};
 use super::evidence::AMPLITUDES;
 use super::scan::CauseTable;
 use super::state::{Component, KnownState};
 use crate::criteria::cells::{
     CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
 };
-use crate::effect::{Form, Motion, Variable, names};
+use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
 
 impl CauseTable<'_, '_> {
@@ -186,7 +186,8 @@ impl CauseTable<'_, '_> {
                 let rest: Vec<&Component> = others.iter().collect();
                 let state = self.state(&rest, Some(kappa));
                 let alike = self.alike(&components[i], 24);
-                let scan = self.scan_some(&alike, &state, &rest, 5, &[own]);
+                let near: Vec<usize> = std::iter::once(own).chain(self.near(&components[i])).collect();
+                let scan = self.scan_some(&alike, &state, &rest, 5, &near);
                 let Some(best) = scan.best() else { continue };
                 let again = rest.iter().any(|other| other.cell == own);
                 let prior = if again { 0.0 } else { self.cells[own].log_prior };
@@ -222,24 +223,30 @@ impl CauseTable<'_, '_> {
         prior - state.log_determinant() - half * (*NU + state.rows.square).ln()
     }
 
-    /// A free curve of a joint's own angle that up to three waves replace is a gear's.
-    pub fn periodic(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        let curves: Vec<u64> = components.iter().filter(|own| self.is_own_curve(own)).map(|own| own.id).collect();
-        for id in curves {
+    /// A component without a name that a few causes of the list replace is those: two waves of a gear look like one curve.
+    pub fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+        let unnamed: Vec<u64> = components.iter().filter(|own| !self.cells[own.cell].is_named()).map(|own| own.id).collect();
+        for id in unnamed {
             let Some(at) = components.iter().position(|own| own.id == id) else { continue };
-            let place = self.cells[components[at].cell].place;
-            let gear = |cell: &CauseCell| cell.place == place && cell.key.starts_with(names::GEAR_CYCLIC);
-            let Some(gear) = self.cells.iter().position(gear) else { continue };
+            self.know(&components);
+            let mut named = self.alike(&components[at], 40);
+            named.extend(self.near(&components[at]).into_iter().filter(|cell| !named.contains(cell)).collect::<Vec<_>>());
+            named.retain(|cell| self.cells[*cell].is_named());
             let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
             for _ in 0..*WAVES {
+                self.know(&next);
                 let rest: Vec<&Component> = next.iter().collect();
                 let state = self.state(&rest, Some(kappa));
-                let Some(mut found) = self.closely(gear, &state, &rest) else { break };
-                found.refined = self.refined(gear, &found, &state, &rest);
-                next.push(self.component(gear, &found));
+                let scan = self.scan_some(&named, &state, &rest, 4, &[]);
+                let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else { break };
+                let found = scan.closely[&best].clone();
+                next.push(self.component(best, &found));
                 next = self.backfit(next, 1);
+                if std::env::var("DBG").is_ok() {
+                    eprintln!("T several {} for {}: {:.1} {:.1} added {}", named.len(), id, self.total(&next, kappa), before, next.last().map_or("", |own| &self.cells[own.cell].key));
+                }
                 if self.total(&next, kappa) > before {
                     components = next;
                     break;
@@ -248,12 +255,6 @@ impl CauseTable<'_, '_> {
         }
         self.know(&components);
         components
-    }
-
-    fn is_own_curve(&self, own: &Component) -> bool {
-        let Shapes::Free(free) = &self.cells[own.cell].shapes else { return false };
-        let Motion::Joint { joint } = free.motion else { return false };
-        free.of == Variable::Angle { joint } && matches!(free.over, Over::Curve { .. })
     }
 
     /// Motions over a variable that show, whose products are not cells yet.
