@@ -120,18 +120,26 @@ impl<'a> SearchRows<'a> {
         self.values.par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
     }
 
-    /// UnitColumns of some forms, one form after another, and how many each has.
+    /// UnitColumns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
+    /// anything of these.
     pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
-        let (rows, problem) = (self.residual.len(), &self.view.problem);
+        let (all, points, problem) = (self.residual.len(), self.view.problem.of_readings().len(), &self.view.problem);
+        let of = |form: &Form| match self.of_term(form) {
+            Some(columns) => (columns, points),
+            None => (problem.motions_by(form), all),
+        };
+        let each: Vec<(Vec<f64>, usize)> = forms.iter().map(of).collect();
+        let moves_currents =
+            |(columns, rows): &(Vec<f64>, usize)| columns.chunks(*rows).any(|column| column[points..].iter().any(|v| *v != 0.0));
+        let rows = if each.iter().any(moves_currents) { all } else { points };
         let mut raw = Vec::new();
         let mut counts = Vec::with_capacity(forms.len());
-        for form in forms {
-            let before = raw.len();
-            match self.of_term(form) {
-                Some(columns) => raw.extend(columns),
-                None => raw.extend(problem.motions_by(form)),
+        for (columns, own) in each {
+            counts.push(columns.len() / own.max(1));
+            for column in columns.chunks(own) {
+                raw.extend_from_slice(&column[..own.min(rows)]);
+                raw.resize(raw.len() + rows.saturating_sub(own), 0.0);
             }
-            counts.push((raw.len() - before) / rows.max(1));
         }
         let square: Vec<f64> = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
         for (column, square) in raw.chunks_mut(rows).zip(&square) {
@@ -140,7 +148,7 @@ impl<'a> SearchRows<'a> {
             let scale = if *square > 0.0 { square.sqrt().recip() } else { 0.0 };
             column.iter_mut().for_each(|value| *value *= scale);
         }
-        project(self.base.as_ref(), &mut raw);
+        project(self.base.as_ref().subrows(0, rows), &mut raw);
         (UnitColumns { values: DMatrix::from_vec(rows, raw.len() / rows.max(1), raw), square }, counts)
     }
 
@@ -149,7 +157,7 @@ impl<'a> SearchRows<'a> {
         let term = form.term()?;
         let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
         let functions = self.functions(term.law())?;
-        let rows = self.residual.len();
+        let rows = self.view.problem.of_readings().len();
         let mut out = vec![0.0; rows * directions.len() * functions.len()];
         let put = |direction: &[f64], function: &[f64], column: &mut [f64]| {
             for (i, value) in function.iter().enumerate() {
@@ -312,8 +320,10 @@ fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
     Some(parts.eigenvectors * roots * parts.eigenvectors.transpose())
 }
 
-/// Transpose of `a` times `b`.
+/// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
 pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let rows = a.nrows().min(b.nrows());
+    let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
     let mut products = DMatrix::zeros(a.ncols(), b.ncols());
     let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
     matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);

@@ -262,7 +262,7 @@ impl KnownState {
         solve_upper_triangular_in_place(self.lower.transpose(), out, Par::Seq);
         let left = DVector::from_column_slice(frame.residual()) - z * weights;
         let of = |own: &&Component| {
-            let along = own.values.tr_mul(&left) / (self.kappa * self.kappa);
+            let along = own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
             let scaled = own.roots().zip(own.sigmas()).zip(along.iter());
             scaled.map(|((root, sigma), along)| sigma * root * along).collect()
         };
@@ -391,7 +391,11 @@ fn solve(lower: &Mat<f64>, columns: &mut [f64]) {
 
 /// The parts of components in the covariance as one matrix.
 fn side_by_side(components: &[&Component], rows: usize) -> DMatrix<f64> {
-    let all: Vec<f64> = components.iter().flat_map(|own| own.part.iter().copied()).collect();
-    let count = all.len() / rows.max(1);
-    DMatrix::from_vec(rows, count, all)
+    let mut out = DMatrix::zeros(rows, components.iter().map(|own| own.part.ncols()).sum());
+    let mut first = 0;
+    for own in components {
+        out.view_mut((0, first), own.part.shape()).copy_from(&*own.part);
+        first += own.part.ncols();
+    }
+    out
 }
