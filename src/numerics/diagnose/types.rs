@@ -262,8 +262,6 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Formulas for findings without a name, those of a finding cheapest first.
     pub formulas: Vec<ClosedForm>,
-    /// Findings that are not in the model, a sentence each; a search drops what does not pay and states none.
-    pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.
     pub clock: bool,
     /// Rows that no smooth model can follow.

@@ -2,8 +2,7 @@
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::{
-    AxisPoint, Basis, Cause, Form, Hypothesis, Law, Measure, Motion, NamedForms, NumberSpec, Place, Summary, Survey, Term,
-    Variable, about, names,
+    AxisPoint, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, about, names,
 };
 use crate::criteria::effect::{RARE, WOBBLES};
 use crate::robot::RobotModel;
@@ -52,17 +51,6 @@ impl Cause for AxisWobble {
         let names = [["a_sin", "a_cos"], ["b_sin", "b_cos"]];
         let chosen = (0..2).filter(|k| about.is_none_or(|about| about == *k)).flat_map(|k| names[k]);
         chosen.map(|name| (name.to_string(), Unit::Radian, 0.01)).collect()
-    }
-
-    /// What a neighbour seems to do with the angle of a joint whose axis wobbles.
-    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
-        let follows = |form: &&Form| match (form.term().map(Term::basis), form.term().and_then(Term::of_one)) {
-            (Some(Basis::Wave { .. }), Some((joint, Variable::Angle { joint: by }))) => {
-                by != joint && own.place == Place::Joint(by)
-            }
-            _ => false,
-        };
-        own.name == self.name() && part.name == names::UNKNOWN && part.forms.iter().all(follows)
     }
 
     fn variant(&self, term: &Term) -> String {

@@ -41,7 +41,6 @@ impl Cause for Backlash {
         confounded: "joint_hardening, joint_log_lag",
         needs: "both directions of approach",
         measure: Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" }),
-        absorbs_residual: &[names::JOINT_HARDENING, names::JOINT_COMPLIANCE, names::PRESLIDING, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

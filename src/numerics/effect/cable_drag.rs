@@ -1,7 +1,7 @@
 //! `cable_drag`: a hose package pulls on a joint by its angle, seen through the joint's compliance as a balancer's spring is; or by its
 //! own angle and its neighbour's, as a law without a name that is called so.
 
-use super::spring::{FINER, MEASURE, Spring};
+use super::spring::{MEASURE, Spring};
 use super::unknown::described;
 use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
@@ -17,7 +17,6 @@ impl Cause for CableDrag {
         confounded: "unknown, gear_cyclic of order 1",
         needs: "motor currents",
         measure: Some(MEASURE),
-        absorbs_residual: FINER,
         read: Some(|body| Spring::read(&CableDrag, body)),
     }
 

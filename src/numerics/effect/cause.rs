@@ -1,7 +1,6 @@
 //! Causes of error: everything that the project knows of one stands in the file that implements [`Cause`], and every cause in one list.
 
 use super::*;
-use crate::criteria::words::REFINEMENT;
 
 /// What a cause is: in words, and in what diagnosis asks of every cause.
 #[derive(Debug, Clone, Copy)]
@@ -22,11 +21,6 @@ pub struct CauseDescription {
     pub of_the_measurement: bool,
     /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
     pub separable_by_poses: bool,
-    /// The size (one sigma, SI) that the coefficients of a law are held to where the rows do not determine them; nothing where they are
-    /// free.
-    pub prior_sigma: Option<f64>,
-    /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
-    pub absorbs_residual: &'static [&'static str],
     /// What separates it from others beside more poses.
     pub measure: Option<Measure>,
     /// The effect of the whole arm, for causes that are identified, not searched for.
@@ -46,8 +40,6 @@ impl CauseDescription {
         needs: "",
         of_the_measurement: false,
         separable_by_poses: true,
-        prior_sigma: None,
-        absorbs_residual: &[],
         measure: None,
         arm_effect: None,
         read: None,
@@ -105,44 +97,9 @@ pub trait Cause: Sync {
         format!("{} at {}", self.name(), summary.place)
     }
 
-    /// Whether it is how a joint yields to its load torque: errors of the torque model move nothing without.
-    fn yields_to_torque(&self) -> bool {
-        false
-    }
-
-    /// Whether a form of it, with its like at other joints, takes up whatever else depends on loads.
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        false
-    }
-
     /// Whether its forms describe something that is in no list.
     fn is_nameless(&self) -> bool {
         false
-    }
-
-    /// [`CauseDescription::prior_sigma`] of one of its terms.
-    fn prior_sigma(&self, _term: &Term) -> Option<f64> {
-        self.about().prior_sigma
-    }
-
-    /// The share of the gain of a finding of this name below which `part`, found beside it, is its finer shape.
-    fn absorbs_below(&self, own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (own.place == part.place && self.about().absorbs_residual.contains(&part.name)).then_some(*REFINEMENT)
-    }
-
-    /// Whether `part` is a part of the finding `own`, which has this cause's name or a form of it, whatever it gains.
-    fn has_part(&self, _own: &NamedForms, _part: &NamedForms, _survey: &Survey) -> bool {
-        false
-    }
-
-    /// The cause of fewer numbers that stands in the place of this one where it explains as well.
-    fn simpler(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Whether one form may stand in for two others: a free curve, or the bending of a link for the wind-up of two joints.
-    fn stands_in_for_two(&self) -> bool {
-        self.is_nameless()
     }
 
     /// What a finding that is made of forms of this cause is in the fitted model as a whole.
@@ -155,7 +112,7 @@ pub trait Cause: Sync {
         None
     }
 
-    /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
+    /// Other causes that do the same as a term of this one, in a finding of the name `called`, in whatever data: identities of kinematics and statics.
     fn identities(&self, _term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
     }
@@ -182,11 +139,6 @@ pub trait Cause: Sync {
     /// recording holds. Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
     fn impossible(&self, _term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         None
-    }
-
-    /// See [`Placed::called`].
-    fn called(&self, _term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
-        self.name()
     }
 }
 
@@ -247,9 +199,4 @@ pub fn arm_effect(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>
 pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
     let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     CAUSES.iter().copied().filter(move |cause| cause.arm_effect(&setting).is_some())
-}
-
-/// Every hypothesis of every cause.
-pub fn hypotheses(survey: &Survey) -> Vec<Hypothesis> {
-    CAUSES.iter().flat_map(|cause| cause.propose(survey)).collect()
 }

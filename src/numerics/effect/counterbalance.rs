@@ -2,7 +2,7 @@
 //!
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
-use super::spring::{FINER, MEASURE, Spring};
+use super::spring::{MEASURE, Spring};
 use super::{Cause, Hypothesis, Summary, Survey, about, names};
 
 pub struct Counterbalance;
@@ -16,7 +16,6 @@ impl Cause for Counterbalance {
         confounded: "gear_cyclic of order 1, link_mass",
         needs: "link masses and motor currents",
         measure: Some(MEASURE),
-        absorbs_residual: FINER,
         read: Some(|body| Spring::read(&Counterbalance, body)),
     }
 

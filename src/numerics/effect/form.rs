@@ -54,15 +54,11 @@ pub trait Placed: Send + Sync {
     fn variant(&self) -> String {
         String::new()
     }
-    /// What it is called with fitted coefficients `p` (SI): another cause's name where they are that cause's in another form.
-    fn called(&self, _p: &[f64], _survey: &Survey) -> &'static str {
-        self.cause().name()
-    }
     /// Why coefficients `p` (SI) cannot be its cause's, as a clause: see [`Cause::impossible`].
     fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         None
     }
-    /// Other causes that do the same under the name `called`, in whatever data: see [`Cause::identities`].
+    /// Other causes that do the same in a finding of the name `called`, in whatever data: see [`Cause::identities`].
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
     }
@@ -70,18 +66,9 @@ pub trait Placed: Send + Sync {
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {
         None
     }
-    /// Which of its parameters are the numbers of a free curve.
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        0..0
-    }
     /// Which of its parameters are of one size: what the rows say of some of them bounds the others.
     fn of_one_size(&self) -> Vec<usize> {
         Vec::new()
-    }
-    /// Parameters, by their numbers, that are held to a size known beforehand (one sigma, SI), so that they carry on no further than that
-    /// where the rows do not determine them.
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        None
     }
     /// The same with its laws held at the ends of what the fitted rows have of their variables; itself where it has none.
     fn held_within(&self, _range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {

@@ -1,6 +1,5 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::joint_table::strongest_orders;
 use super::summary::amplitude;
 use super::{
     Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable, about, figure,
@@ -35,8 +34,6 @@ impl Cause for GearCyclic {
         size: "5 to 100 arcsec",
         confounded: "counterbalance at n = 1, axis_wobble",
         needs: "enough points a period",
-        absorbs_residual: &[names::UNKNOWN],
-        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
@@ -87,11 +84,7 @@ impl Cause for GearCyclic {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let mut orders: Vec<String> =
-            summary.estimates(names::GEAR_CYCLIC).map(|(term, numbers)| order(term, &numbers)).collect();
-        let weight = summary.words(names::JOINT_COMPLIANCE);
-        orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
-        orders.extend(summary.estimates(names::JOINT_TABLE).map(|(table, numbers)| strongest_orders(table, &numbers)));
+        let orders: Vec<String> = summary.estimates(names::GEAR_CYCLIC).map(|(term, numbers)| order(term, &numbers)).collect();
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
     }
 

@@ -1,6 +1,6 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
-use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -18,8 +18,6 @@ impl Cause for GearFlank {
         confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
         needs: "both directions of approach over the joint's range",
         measure: Some(Measure { rank: 5, advice: "repeat poses from both sides over the whole range of the joint" }),
-        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

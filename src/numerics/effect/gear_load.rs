@@ -1,6 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, names, orders};
+use super::{Cause, Hypothesis, Measure, NumberSpec, Summary, Survey, Term, Variable, about, orders};
 use crate::criteria::effect::RARE;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -22,7 +22,6 @@ impl Cause for GearLoad {
             rank: 5,
             advice: "repeat poses with and without a payload over the whole range of the joint",
         }),
-        absorbs_residual: &[names::GEAR_CYCLIC, names::JOINT_COMPLIANCE, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

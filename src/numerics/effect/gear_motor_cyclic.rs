@@ -18,7 +18,6 @@ impl Cause for GearMotorCyclic {
         size: "2 to 30 arcsec",
         confounded: "noise: nothing else is as fast",
         needs: "reduction ratios in the robot file",
-        prior_sigma: Some(orders::LARGE),
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

@@ -23,7 +23,6 @@ impl Cause for JointCompliance {
         size: "0.1 to 10 urad/Nm",
         confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
         needs: "link masses, motor currents, or many postures",
-        absorbs_residual: &[names::UNKNOWN],
         arm_effect: Some(|setting| Box::new(Windups(setting.load))),
         read: Some(|body| UnweighedWindup::read(&JointCompliance, body).unwrap_or_else(|| Form::kept::<Windup>(body))),
     }
@@ -56,10 +55,6 @@ impl Cause for JointCompliance {
                  not give"
             ),
         }
-    }
-
-    fn yields_to_torque(&self) -> bool {
-        true
     }
 }
 

@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place, Placed, Summary,
-    Survey, Variable, about, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, ParameterEstimate, Place, Placed, Summary, Survey,
+    Variable, about, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -37,8 +37,6 @@ pub struct BentWindup {
     law: HardeningLaw,
 }
 
-/// What a wind-up lacks in proportion at its bend, rad (one sigma): 200 arcsec.
-const LARGE: f64 = 1e-3;
 /// Sines of a free curve.
 const CURVE: usize = 6;
 /// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
@@ -46,10 +44,6 @@ const CURVE: usize = 6;
 const BENDS: [f64; 2] = [0.01, 0.98];
 /// Share of the rows that has to lie on the other side of a bend.
 const BEYOND: f64 = 0.05;
-/// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
-const SHARP: f64 = 0.15;
-const FLAT: f64 = 0.1;
-
 impl Cause for JointHardening {
     about! {
         name: names::JOINT_HARDENING,
@@ -62,7 +56,6 @@ impl Cause for JointHardening {
             rank: 7,
             advice: "measure with a third payload between none and full, and with joints near their largest load",
         }),
-        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
         read: Some(Form::kept::<BentWindup>),
     }
 
@@ -90,23 +83,6 @@ impl Cause for JointHardening {
         let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
-
-    /// A joint has one wind-up.
-    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
-        own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
-    }
-
-    fn simpler(&self) -> Option<&'static str> {
-        Some(names::JOINT_COMPLIANCE)
-    }
-
-    fn yields_to_torque(&self) -> bool {
-        true
-    }
-
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        true
-    }
 }
 
 /// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;
@@ -125,18 +101,6 @@ fn least_bend(survey: &Survey, joint: usize) -> f64 {
 }
 
 impl BentWindup {
-    /// Whether coefficients `p` make a wind-up that does not grow with the load beyond a small one: lost motion to the side of the
-    /// load. `most` is the largest torque, Nm.
-    fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
-        match (self.law, p) {
-            (
-                HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm },
-                [linear, bend],
-            ) => at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs(),
-            _ => false,
-        }
-    }
-
     /// f and its slope.
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
@@ -203,24 +167,6 @@ impl Placed for BentWindup {
         Some((self.joint, *p.first()?))
     }
 
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        if let HardeningLaw::Curve { .. } = self.law { 1..1 + CURVE } else { 0..0 }
-    }
-
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        match self.law {
-            HardeningLaw::Saturating { at_nm }
-            | HardeningLaw::SoftZone { at_nm }
-            | HardeningLaw::Knee { at_nm }
-            | HardeningLaw::Power { at_nm, .. } => Some((1..2, LARGE / at_nm)),
-            HardeningLaw::Curve { .. } => None,
-        }
-    }
-
-    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        if self.is_lost_motion(p, survey.load(self.joint)) { names::BACKLASH } else { names::JOINT_HARDENING }
-    }
-
     fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = self.law
         else {
@@ -229,10 +175,6 @@ impl Placed for BentWindup {
         let most = survey.recorded_load(self.joint);
         let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
         (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
-    }
-
-    fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
-        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, self.place())] } else { Vec::new() }
     }
 
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {

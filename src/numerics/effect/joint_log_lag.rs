@@ -3,10 +3,10 @@
 
 use super::form::placed;
 use super::{
-    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary, Survey, Variable,
-    about, figure, names,
+    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about,
+    figure, names,
 };
-use crate::criteria::words::{CLOCKS, TRACE};
+use crate::criteria::words::CLOCKS;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -92,11 +92,6 @@ impl Cause for JointLogLag {
             }
             None => "joints and points do not belong to the same moment".to_string(),
         }
-    }
-
-    /// A backlash follows the side of the last move, too.
-    fn absorbs_below(&self, _own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (part.name == names::BACKLASH).then_some(*TRACE)
     }
 
     fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {

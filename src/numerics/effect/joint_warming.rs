@@ -1,8 +1,6 @@
 //! `joint_warming`: a joint's zero, ratio or stiffness follows a temperature, the warm-up, or the heat of the joint's own work.
 
-use super::{
-    Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names, warmth,
-};
+use super::{Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about, figure, names, warmth};
 use crate::criteria::effect::RARE;
 use crate::robot::{Memory, RobotModel};
 use crate::units::Unit;
@@ -37,7 +35,6 @@ impl Cause for JointWarming {
         confounded: "tracker_drift and base_shift (joint 1), thermal_growth",
         needs: "temperature or time",
         measure: Some(super::thermal_growth::MEASURE),
-        absorbs_residual: &[names::UNKNOWN],
         separable_by_poses: false,
     }
 
@@ -80,10 +77,6 @@ impl Cause for JointWarming {
             Some(_) => "stiffness",
         }
         .into()
-    }
-
-    fn takes_up_loads(&self, form: &Form) -> bool {
-        form.variables().iter().any(|of| matches!(of, Variable::Load { .. }))
     }
 
     fn impossible(&self, term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {

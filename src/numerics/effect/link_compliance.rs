@@ -60,10 +60,6 @@ impl Cause for LinkCompliance {
             .collect()
     }
 
-    fn stands_in_for_two(&self) -> bool {
-        true
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         format!("{} bends under what it carries by {}", summary.place, summary.value())
     }

@@ -41,10 +41,6 @@ impl Cause for LinkMass {
         forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
     }
 
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        true
-    }
-
     fn sentence(&self, summary: &Summary) -> String {
         format!("the mass or centre of {} in the torque model is wrong", summary.place)
     }

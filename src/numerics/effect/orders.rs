@@ -8,8 +8,7 @@ use std::f64::consts::TAU;
 /// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
 const PHASE: f64 = 2.2;
 
-/// Twice what the worst gears and encoders err by, rad (206 arcsec), and what none does.
-pub(super) const LARGE: f64 = 1e-3;
+/// What no gear or encoder errs by, rad.
 pub(super) const BEYOND: f64 = 5e-3;
 
 /// A sine and a cosine of `order` times the variable.

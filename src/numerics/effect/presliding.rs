@@ -32,7 +32,6 @@ impl Cause for Presliding {
             rank: 5,
             advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
         }),
-        absorbs_residual: &[names::BACKLASH, names::JOINT_LOG_LAG, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

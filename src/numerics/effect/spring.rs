@@ -17,9 +17,6 @@ pub(super) const MEASURE: Measure = Measure {
     advice: "log motor currents at rest, or measure with two payloads over the joint's full range (for a balancer also disconnected)",
 };
 
-/// What its own shape may leave at the same joint.
-pub(super) const FINER: &[&str] = &[names::GEAR_CYCLIC, names::UNKNOWN, names::JOINT_TABLE, names::BACKLASH];
-
 /// Under the name of a cause.
 #[derive(Clone)]
 pub(super) struct Spring {

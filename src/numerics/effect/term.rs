@@ -131,10 +131,6 @@ impl Placed for Term {
         self.cause.variant(self)
     }
 
-    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        self.cause.called(self, p, survey)
-    }
-
     fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         self.cause.impossible(self, p, error, survey)
     }
@@ -151,14 +147,6 @@ impl Placed for Term {
         let held = |factor: Factor| range(factor.of).map_or(factor, |range| factor.held_within(range));
         let law = Law { first: held(self.law.first), times: self.law.times.map(held) };
         Some(self.with(law).into())
-    }
-
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        Some((0..self.law.count(), self.cause.prior_sigma(self)?))
-    }
-
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        if self.is_own_curve() { 0..self.law.count() } else { 0..0 }
     }
 
     fn body(&self) -> serde_json::Value {

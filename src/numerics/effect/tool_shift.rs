@@ -1,9 +1,6 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
-use super::{
-    Axes, Cause, FittedForms, Hypothesis, ModelledFinding, Motion, NamedForms, Place, Summary, Survey, about, change, holder,
-    names,
-};
+use super::{Axes, Cause, FittedForms, Hypothesis, ModelledFinding, Motion, Summary, Survey, about, change, holder, names};
 
 /// A target that moves at some time.
 pub struct ToolShift;
@@ -26,14 +23,6 @@ impl Cause for ToolShift {
 
     fn sentence(&self, summary: &Summary) -> String {
         format!("the target on the tool has moved{}", summary.when(self.name()))
-    }
-
-    /// One target on the last body that turns about its axis is one step, though the last joint's zero takes a part of it.
-    fn has_part(&self, own: &NamedForms, part: &NamedForms, survey: &Survey) -> bool {
-        let last = (names::ZERO_SHIFT, Place::Joint(survey.joints() - 1));
-        (own.name, own.place) == (self.name(), Place::Tool)
-            && (part.name, part.place) == last
-            && holder::step_together(own, part, survey)
     }
 
     fn in_the_model(&self, fitted: &FittedForms) -> Option<ModelledFinding> {

@@ -48,8 +48,6 @@ const LEVER: f64 = 0.05;
 const SLIGHT: f64 = 0.1;
 /// The forms of one joint: bodies with and without moments across their lines.
 const FORMS: usize = 3;
-/// A wheel off its centre errs with any phase; within this tangent of the phase of a weight it is a weight.
-const PHASE: f64 = 1.5;
 /// rad; one sigma of what is known.
 const WIDE: f64 = 0.01;
 /// rad, under the weight of one body at full stretch; the softest joints (20,000 Nm/rad under 200 Nm) yield as much.
@@ -199,21 +197,6 @@ impl Placed for UnweighedWindup {
 
     fn variant(&self) -> String {
         "gravity".into()
-    }
-
-    /// Weights hang outwards: what acts the other way is something else by the same angles.
-    fn called(&self, p: &[f64], _survey: &Survey) -> &'static str {
-        let sum = |outwards: bool| {
-            let own = self.shape.moments.iter().zip(p).filter(|(moment, _)| moment.outwards == outwards);
-            own.map(|(_, value)| if outwards { *value } else { value.abs() }).sum::<f64>()
-        };
-        let (outwards, across) = (sum(true), sum(false));
-        let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
-        match self.shape.own_angle {
-            true if has(false) && across > PHASE * outwards => names::GEAR_CYCLIC,
-            _ if has(true) && outwards < 0.0 => names::CABLE_DRAG,
-            _ => self.cause.name(),
-        }
     }
 
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.

@@ -25,7 +25,6 @@ impl Cause for ViscousWindup {
         size: "0.2 to 10 arcsec for each deg/s",
         confounded: "joint_log_lag where one joint moves alone",
         needs: "joint velocities, of a moving arm",
-        absorbs_residual: &[names::BACKLASH, names::GEAR_CYCLIC, names::UNKNOWN],
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {

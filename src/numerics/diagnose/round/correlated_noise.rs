@@ -8,7 +8,7 @@ use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
 use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
-use crate::diagnose::pool::{orthonormal, project};
+use crate::diagnose::linear::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
 use crate::robot::Measurements;

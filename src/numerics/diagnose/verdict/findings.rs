@@ -9,9 +9,7 @@ use crate::diagnose::round::FitState;
 use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
 use crate::diagnose::words::{left_out, not_so, sentence, small, told};
-use crate::effect::{
-    Basis, Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people,
-};
+use crate::effect::{Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people};
 use crate::estimate::{Model, ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first; `something_left` says whether they leave more than noise.
@@ -170,11 +168,7 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Paramete
 /// Joint and range over which the errors of a joint hold.
 fn valid(forms: &[Form], last: &LastRound) -> Option<(usize, [f64; 2])> {
     let Place::Joint(joint) = forms[0].place() else { return None };
-    let table = forms.iter().find_map(|form| match form.term()?.basis() {
-        Basis::Fading { low, high, .. } => Some([low, high]),
-        _ => None,
-    });
-    Some((joint, table.unwrap_or(last.survey.range[joint])))
+    Some((joint, last.survey.range[joint]))
 }
 
 /// Rms size (m or rad) of some causes over the fitted rows, with what geometry could absorb of them.

@@ -7,7 +7,7 @@ use super::declaration::EffectDeclaration;
 use super::pattern::DeclaredPattern;
 use super::seat::Seat;
 use super::words::filled;
-use crate::effect::{Cause, CauseDescription, Measure, Place, Summary, figure, names};
+use crate::effect::{Cause, CauseDescription, Measure, Place, Summary, figure};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
 
@@ -54,7 +54,6 @@ impl DeclaredCause {
                 confounded: stated(&declaration.confounded, "-"),
                 needs: stated(&declaration.needs, &needs),
                 of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
-                absorbs_residual: &[names::UNKNOWN],
                 measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
                 ..CauseDescription::PLAIN
             })),
