@@ -18,7 +18,7 @@
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
-//! | [`effect`] | the library of physical effects, one file each, and their composition | criteria, robot, spatial |
+//! | [`effect`] | the library of physical effects, a row of the table of causes each, and their composition | criteria, robot, spatial |
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | criteria, effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
@@ -83,7 +83,7 @@
 //! | export format | `src/export/<name>.rs`, which declares an [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
-//! An effect step by step, with a file that a test compiles and fits: `src/numerics/effect/README.md`.
+//! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.
 //!
 //! House rules: one idea one file, named by its noun, 60 to 250 lines, 400 at most; no function above 80 lines; names of types once. Verbs
 //! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.

@@ -18,7 +18,7 @@ fn stepped(form: &Form, joints: usize) -> Option<f64> {
 }
 
 /// A finding that is made of such steps alone, as a turn of the holder.
-pub(super) fn turned(fitted: &FittedForms) -> Option<ModelledFinding> {
+pub fn turned_holder(fitted: &FittedForms) -> Option<ModelledFinding> {
     let FittedForms { robot, data, rows, .. } = *fitted;
     let joints = robot.joints();
     if joints < 2 || !robot.is_revolute(joints - 1) {

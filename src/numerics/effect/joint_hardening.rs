@@ -1,19 +1,16 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
 use super::form::placed;
-use super::joint_table::PLAUSIBLE;
+use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, ParameterEstimate, Place, Placed, Summary, Survey,
-    Variable, about, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, MotionRow, NumberSpec, ParameterEstimate, Place, Placed, Summary,
+    Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
-
-/// Wind-up that is not in proportion to the load.
-pub struct JointHardening;
 
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,45 +41,43 @@ const CURVE: usize = 6;
 const BENDS: [f64; 2] = [0.01, 0.98];
 /// Share of the rows that has to lie on the other side of a bend.
 const BEYOND: f64 = 0.05;
-impl Cause for JointHardening {
-    about! {
-        name: names::JOINT_HARDENING,
-        place: "joint",
-        formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
-        size: "5 to 50 % of the wind-up",
-        confounded: "joint_compliance, backlash",
-        needs: "link masses and two payloads",
-        measure: Some(Measure {
-            rank: 7,
-            advice: "measure with a third payload between none and full, and with joints near their largest load",
-        }),
-        read: Some(Form::kept::<BentWindup>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::JOINT_HARDENING,
+    place: "joint",
+    formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
+    size: "5 to 50 % of the wind-up",
+    confounded: "joint_compliance, backlash",
+    needs: "link masses and two payloads",
+    measure: Some(Measure {
+        rank: 7,
+        advice: "measure with a third payload between none and full, and with joints near their largest load",
+    }),
+    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<BentWindup> }),
+    ..Cause::PLAIN
+};
 
-    /// Every loaded joint with several laws each.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let mut out = Vec::new();
-        for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
-            let most = survey.load(joint);
-            let least = least_bend(survey, joint);
-            let seen = move |share: &f64| share * most >= least;
-            let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
-            let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
-            let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
-            let laws =
-                laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
-            let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
-            let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
-            out.push(Hypothesis::new(curve, 1).penalised(*RARE));
-        }
-        out
+/// Every loaded joint with several laws each.
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let mut out = Vec::new();
+    for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
+        let most = survey.load(joint);
+        let least = least_bend(survey, joint);
+        let seen = move |share: &f64| share * most >= least;
+        let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
+        let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
+        let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
+        let laws = laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
+        let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
+        out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
+        let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
+        out.push(Hypothesis::new(curve, 1).penalised(*RARE));
     }
+    out
+}
 
-    fn sentence(&self, summary: &Summary) -> String {
-        let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
-        format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
-    }
+fn sentence(summary: &Summary) -> String {
+    let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
+    format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
 }
 
 /// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;
@@ -123,7 +118,7 @@ impl BentWindup {
 }
 
 impl Placed for BentWindup {
-    placed! { self: Place::Joint(self.joint), &JointHardening, [Variable::Load { joint: self.joint }], self }
+    placed! { self: Place::Joint(self.joint), &CAUSE, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A law at a place, under the name of a cause.
 #[derive(Clone)]
 pub struct Term {
-    cause: &'static dyn Cause,
+    cause: &'static Cause,
     motion: Motion,
     law: Law,
 }
@@ -23,12 +23,12 @@ struct Stored {
 
 impl Term {
     /// A law of a motion, under the name of a cause.
-    pub fn new(cause: &'static dyn Cause, motion: Motion, law: Law) -> Self {
-        Self { cause, motion, law }
+    pub fn new(cause: impl Into<&'static Cause>, motion: Motion, law: Law) -> Self {
+        Self { cause: cause.into(), motion, law }
     }
 
     /// Reads what [`Form::body`] made of a term.
-    pub(super) fn read(cause: &'static dyn Cause, body: serde_json::Value) -> serde_json::Result<Form> {
+    pub(super) fn read(cause: &'static Cause, body: serde_json::Value) -> serde_json::Result<Form> {
         let Stored { motion, law } = serde_json::from_value(body)?;
         Ok(Self { cause, motion, law }.into())
     }
@@ -88,7 +88,7 @@ impl PartialEq for Term {
 }
 
 impl Placed for Term {
-    fn cause(&self) -> &'static dyn Cause {
+    fn cause(&self) -> &'static Cause {
         self.cause
     }
 
@@ -132,7 +132,7 @@ impl Placed for Term {
     }
 
     fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        self.cause.impossible(self, p, error, survey)
+        self.cause.law(self)?.impossible(self, p, error, survey)
     }
 
     fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {

@@ -1,122 +1,116 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
-use super::joint_table::PLAUSIBLE;
-use super::{Axes, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Survey, Term, Variable, about, names};
+use super::{Axes, Basis, Cause, Clock, Motion, NumberSpec, Place, Polar, Summary, Term, Variable, names};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
-/// Structure of no law of the list.
+/// Structure of no law of the list, as a cause: see [`Term::new`].
 pub struct Unknown;
+
+impl From<&Unknown> for &'static Cause {
+    fn from(_: &Unknown) -> Self {
+        &CAUSE
+    }
+}
+
+pub(super) static CAUSE: Cause = Cause {
+    name: names::UNKNOWN,
+    place: "joint, link, base, tool or tracker",
+    formula: "a form-free function of joints, time, payload or sight",
+    confounded: "whatever is in no list",
+    sentence: "{place} has an error that no entry of the library explains: {law}",
+    ..Cause::PLAIN
+};
 
 /// One sigma of what is known of a coefficient before any measurement, SI.
 const WIDE: f64 = 0.01;
 const PER_LOAD: f64 = 1e-4;
+/// The same of a curve of a joint's own angle, rad (60 arcsec): holds it down where points are sparse.
+pub(super) const PLAUSIBLE: f64 = 3e-4;
 
-impl Cause for Unknown {
-    about! {
-        name: names::UNKNOWN,
-        place: "joint, link, base, tool or tracker",
-        formula: "a form-free function of joints, time, payload or sight",
-        size: "any",
-        confounded: "whatever is in no list",
-        needs: "-",
-    }
-
-    fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
-        let counted = 1..=term.law().count();
-        let each = |prefixes: &[&str], unit: Unit, sigma: f64| -> Vec<NumberSpec> {
-            let of_one = |prefix| counted.clone().map(move |k| (format!("{prefix}{k}"), unit, sigma));
-            prefixes.iter().flat_map(of_one).collect()
-        };
-        match term.motion() {
-            Motion::Joint { .. } if term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. })) => {
-                each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD)
-            }
-            Motion::Joint { .. } => each(&["c"], term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
-            Motion::Instrument { of: Polar::Range } => each(&["c"], Unit::Millimetre, 1e-3),
-            Motion::Instrument { .. } => each(&["c"], Unit::Radian, 1e-4),
-            Motion::Axis { about: Some(axis), .. } => each(&[["a", "b"][axis.min(1)]], Unit::Radian, WIDE),
-            Motion::Axis { .. } | Motion::Bend { .. } => each(&["a", "b"], Unit::Radian, WIDE),
-            Motion::Links { .. } => each(&["c"], Unit::One, WIDE),
-            Motion::Slide { along: true, .. } => each(&["s"], Unit::Millimetre, WIDE),
-            Motion::Slide { .. } => each(&["u", "v"], Unit::Millimetre, WIDE),
-            motion => {
-                let numbers = counted.clone().flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
-                numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
-            }
+/// The coefficients of a law without a name.
+pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
+    let counted = 1..=term.law().count();
+    let each = |prefixes: &[&str], unit: Unit, sigma: f64| -> Vec<NumberSpec> {
+        let of_one = |prefix| counted.clone().map(move |k| (format!("{prefix}{k}"), unit, sigma));
+        prefixes.iter().flat_map(of_one).collect()
+    };
+    match term.motion() {
+        Motion::Joint { .. } if term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. })) => {
+            each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD)
+        }
+        Motion::Joint { .. } => each(&["c"], term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+        Motion::Instrument { of: Polar::Range } => each(&["c"], Unit::Millimetre, 1e-3),
+        Motion::Instrument { .. } => each(&["c"], Unit::Radian, 1e-4),
+        Motion::Axis { about: Some(axis), .. } => each(&[["a", "b"][axis.min(1)]], Unit::Radian, WIDE),
+        Motion::Axis { .. } | Motion::Bend { .. } => each(&["a", "b"], Unit::Radian, WIDE),
+        Motion::Links { .. } => each(&["c"], Unit::One, WIDE),
+        Motion::Slide { along: true, .. } => each(&["s"], Unit::Millimetre, WIDE),
+        Motion::Slide { .. } => each(&["u", "v"], Unit::Millimetre, WIDE),
+        motion => {
+            let numbers = counted.clone().flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
+            numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
         }
     }
+}
 
-    /// The shapes of its curve are those of its cell.
-    fn near(&self, _term: &Term, _survey: &Survey, _level: i32) -> Vec<Term> {
-        Vec::new()
-    }
-
-    fn variant(&self, term: &Term) -> String {
-        let label = |of: &Variable| match of {
-            Variable::Gravity { axis: Some(axis) } => format!("gravity_{}", ["x", "y", "z"][*axis]),
-            Variable::Stretch { joint, .. } => format!("stretch_{}", joint + 1),
-            Variable::Recent { joint, .. } => format!("recent_{}", joint + 1),
-            Variable::Position { along } | Variable::Sighted { along } => {
-                format!("position_{}", along.map(|value| format!("{:.0}", 100.0 * value)).join("_"))
-            }
-            of => of.to_string().replace(' ', "_"),
-        };
-        let names: Vec<String> = term.law().variables().iter().map(label).collect();
-        let shape = match term.basis() {
-            Basis::Linear { .. } => "_line".into(),
-            Basis::After { at } => format!("_after_{at:.0}"),
-            _ => String::new(),
-        };
-        if let Motion::Instrument { of } = term.motion() {
-            return format!("{of:?}_{}{shape}", names.join("_")).to_lowercase();
+/// What tells a law without a name from others at its place: see [`Placed::variant`](super::Placed::variant).
+pub(super) fn variant(term: &Term) -> String {
+    let label = |of: &Variable| match of {
+        Variable::Gravity { axis: Some(axis) } => format!("gravity_{}", ["x", "y", "z"][*axis]),
+        Variable::Stretch { joint, .. } => format!("stretch_{}", joint + 1),
+        Variable::Recent { joint, .. } => format!("recent_{}", joint + 1),
+        Variable::Position { along } | Variable::Sighted { along } => {
+            format!("position_{}", along.map(|value| format!("{:.0}", 100.0 * value)).join("_"))
         }
-        let curve = term.law().factors().any(|factor| factor.basis.is_curve());
-        let moves = match term.motion() {
-            Motion::Slide { along: true, .. } => "along_",
-            Motion::Slide { .. } => "across_",
-            Motion::Bend { .. } => "bent_",
-            Motion::Axis { turning: true, .. } => "axis_turning_",
-            Motion::Axis { .. } => "axis_",
-            Motion::Base { axes: Axes::Rotation } => "turned_",
-            _ => "",
-        };
-        if !moves.is_empty() || curve && term.law().times.is_some() {
-            return format!("{moves}{}{shape}", names.join("_"));
-        }
-        match (term.basis(), term.law().first.of) {
-            (_, Variable::Gravity { .. }) if curve => names.join("_"),
-            (_, Variable::Gravity { .. }) => "sag".into(),
-            (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),
-            (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
-            (_, Variable::Temperature) if curve => "warm_curve".into(),
-            (_, Variable::Temperature) => "warm".into(),
-            (_, Variable::Payload) => "payload".into(),
-            _ => format!("{}{shape}", names.join("_")),
-        }
+        of => of.to_string().replace(' ', "_"),
+    };
+    let names: Vec<String> = term.law().variables().iter().map(label).collect();
+    let shape = match term.basis() {
+        Basis::Linear { .. } => "_line".into(),
+        Basis::After { at } => format!("_after_{at:.0}"),
+        _ => String::new(),
+    };
+    if let Motion::Instrument { of } = term.motion() {
+        return format!("{of:?}_{}{shape}", names.join("_")).to_lowercase();
     }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        let law = described(summary).unwrap_or_default();
-        format!("{} has an error that no entry of the library explains: {law}", summary.place)
+    let curve = term.law().factors().any(|factor| factor.basis.is_curve());
+    let moves = match term.motion() {
+        Motion::Slide { along: true, .. } => "along_",
+        Motion::Slide { .. } => "across_",
+        Motion::Bend { .. } => "bent_",
+        Motion::Axis { turning: true, .. } => "axis_turning_",
+        Motion::Axis { .. } => "axis_",
+        Motion::Base { axes: Axes::Rotation } => "turned_",
+        _ => "",
+    };
+    if !moves.is_empty() || curve && term.law().times.is_some() {
+        return format!("{moves}{}{shape}", names.join("_"));
     }
-
-    fn is_nameless(&self) -> bool {
-        true
+    match (term.basis(), term.law().first.of) {
+        (_, Variable::Gravity { .. }) if curve => names.join("_"),
+        (_, Variable::Gravity { .. }) => "sag".into(),
+        (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),
+        (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
+        (_, Variable::Temperature) if curve => "warm_curve".into(),
+        (_, Variable::Temperature) => "warm".into(),
+        (_, Variable::Payload) => "payload".into(),
+        _ => format!("{}{shape}", names.join("_")),
     }
+}
 
-    fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
-        let place = term.motion().place();
-        let joint = matches!(place, Place::Joint(_));
-        match (term.basis(), term.law().first.of) {
-            (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
-                vec![(names::AXIS_WOBBLE, Place::Joint(by))]
-            }
-            // No motor current tells of a pull.
-            _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
-            _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
-            _ => Vec::new(),
+/// Causes that do the same as a law without a name, in a finding of the name `called`.
+pub(super) fn identities(term: &Term, called: &str) -> Vec<(&'static str, Place)> {
+    let place = term.motion().place();
+    let joint = matches!(place, Place::Joint(_));
+    match (term.basis(), term.law().first.of) {
+        (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
+            vec![(names::AXIS_WOBBLE, Place::Joint(by))]
         }
+        // No motor current tells of a pull.
+        _ if called == names::CABLE_DRAG => vec![(names::UNKNOWN, place)],
+        _ if joint && term.two_angles().is_some() => vec![(names::CABLE_DRAG, place)],
+        _ => Vec::new(),
     }
 }
 

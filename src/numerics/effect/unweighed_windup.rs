@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Under the name of a cause.
 #[derive(Clone)]
 pub(super) struct UnweighedWindup {
-    cause: &'static dyn Cause,
+    cause: &'static Cause,
     shape: WindupShape,
 }
 
@@ -56,7 +56,7 @@ const LARGEST: f64 = 0.01;
 impl UnweighedWindup {
     /// Proposes wind-ups of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file
     /// gives no mass.
-    pub fn propose(cause: &'static dyn Cause, survey: &Survey) -> Vec<Hypothesis> {
+    pub fn propose(cause: &'static Cause, survey: &Survey) -> Vec<Hypothesis> {
         if !is_unweighed(survey.robot) {
             return Vec::new();
         }
@@ -67,7 +67,7 @@ impl UnweighedWindup {
         loaded.flat_map(|joint| Self::at(cause, survey.robot, joint, &lines)).collect()
     }
 
-    fn at(cause: &'static dyn Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
+    fn at(cause: &'static Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
         let most = lines[joint..].iter().map(|line| line.norm()).fold(0.0, f64::max);
         let bodies: Vec<usize> = (joint..robot.joints()).filter(|body| robot.is_revolute(*body)).collect();
         let heavy: Vec<usize> = bodies.iter().copied().filter(|body| lines[*body].norm() > SLIGHT * most).collect();
@@ -99,7 +99,7 @@ impl UnweighedWindup {
     }
 
     /// Reads the body of a form, where it is one of these.
-    pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+    pub fn read(cause: &'static Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         body.get("moments")?;
         Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
     }

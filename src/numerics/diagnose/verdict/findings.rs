@@ -9,7 +9,9 @@ use crate::diagnose::round::FitState;
 use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
 use crate::diagnose::words::{left_out, not_so, sentence, small, told};
-use crate::effect::{Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people};
+use crate::effect::{
+    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people, turned_holder,
+};
 use crate::estimate::{Model, ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first; `something_left` says whether they leave more than noise.
@@ -105,7 +107,7 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
     let state = &last.state;
     let Model { robot, stack, x, .. } = &state.model;
     let fitted = FittedForms { robot, stack, x, data: last.survey.data, rows: &state.screening.kept, called, forms };
-    let modelled = forms.first()?.cause().in_the_model(&fitted)?;
+    let modelled = turned_holder(&fitted)?;
     (!last.excludes(modelled.same.0)).then_some(modelled)
 }
 
