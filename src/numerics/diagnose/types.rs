@@ -136,11 +136,6 @@ impl Finding {
     pub fn is_physics(&self) -> bool {
         self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)
     }
-
-    /// Whether nothing but a shape stands behind it.
-    pub fn has_no_law(&self) -> bool {
-        !self.forms.is_empty() && self.forms.iter().all(|form| form.cause().is_nameless())
-    }
 }
 
 /// The likeliest of all cells at a place, or of a variable.
