@@ -18,7 +18,7 @@
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
-//! | [`effect`] | the library of physical effects, one file each, and their composition | criteria, robot, spatial |
+//! | [`effect`] | the library of physical effects, a row of the table of causes each, and their composition | criteria, robot, spatial |
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | criteria, effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
@@ -72,7 +72,7 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | `src/numerics/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
+//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs` | - |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
@@ -83,7 +83,7 @@
 //! | export format | `src/export/<name>.rs`, which declares an [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
-//! An effect step by step, with a file that a test compiles and fits: `src/numerics/effect/README.md`.
+//! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.
 //!
 //! House rules: one idea one file, named by its noun, 60 to 250 lines, 400 at most; no function above 80 lines; names of types once. Verbs
 //! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.

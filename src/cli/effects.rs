@@ -1,7 +1,7 @@
 //! `calib effects`: the library of effects, in words.
 
 use super::{emit, emit_json};
-use crate::effect::{CAUSES, CauseDescription, cause};
+use crate::effect::{CAUSES, Cause, cause};
 use crate::error::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -22,15 +22,16 @@ pub(super) struct EffectsArguments {
 }
 
 pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
-    let chosen: Vec<&CauseDescription> = match &arguments.name {
-        None => CAUSES.iter().map(|cause| cause.about()).collect(),
-        Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?.about()],
+    let chosen: Vec<&Cause> = match &arguments.name {
+        None => CAUSES.to_vec(),
+        Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?],
     };
     if arguments.json {
-        let one = |about: &&CauseDescription| {
+        let one = |about: &&Cause| {
             json!({
                 "name": about.name, "place": about.place, "formula": about.formula, "size": about.size,
                 "confounded": about.confounded, "needs": about.needs,
+                "measure": about.measure.map(|measure| measure.advice),
             })
         };
         return emit_json(&json!(chosen.iter().map(one).collect::<Vec<_>>()));
@@ -39,9 +40,10 @@ pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
     emit(&text.join("\n"))
 }
 
-fn entry(about: &CauseDescription) -> String {
+fn entry(about: &Cause) -> String {
+    let measure = about.measure.map_or_else(String::new, |measure| format!("  measure     {}\n", measure.advice));
     format!(
-        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n",
+        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n{measure}",
         about.name, about.place, about.formula, about.size, about.confounded, about.needs
     )
 }

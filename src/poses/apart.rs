@@ -7,7 +7,7 @@ use super::{PoseRequest, wish};
 use crate::audit::{POSITIONS, diagnosis};
 use crate::description::RobotDescription;
 use crate::diagnose::{DiagnosedModel, discrimination_problem};
-use crate::effect::{CAUSES, Form, JointTable, Load, Place, cause};
+use crate::effect::{CAUSES, Form, Load, Place, cause};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::identified::convention_of;
@@ -55,7 +55,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
     let rivals: Rivals = written(store, &stage)?;
-    let (finding, mut rival) = pair(&place, &findings, &rivals, names)?;
+    let (finding, rival) = pair(&place, &findings, &rivals, names)?;
     let forms: Vec<Form> =
         serde_json::from_str(&finding.forms).map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
     if forms.is_empty() {
@@ -91,9 +91,8 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let mut tried = None;
     let told = match discrimination_problem(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((problem, form)) => {
-            rival = (form.name().to_string(), form.place());
             // A free curve is known where points were fitted, and nowhere else.
-            if forms.iter().chain([&form]).any(|form| form.is(&JointTable) || form.cause().is_nameless()) {
+            if forms.iter().chain([&form]).any(|form| form.cause().is_nameless()) {
                 within(&mut site, &recorded);
             }
             tried = Some(form);

@@ -75,8 +75,6 @@ pub(super) fn section(tables: &Tables) -> Option<Value> {
         "meanings": meanings,
         "next": tables.said(&verdict.step, VerdictTopic::NextMeasurement),
         "signature": verdict.signature,
-        // Findings that were taken back.
-        "withdrawn": tables.said(&verdict.step, VerdictTopic::Withdrawn),
         "suspects": suspects
             .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
             .collect::<Vec<_>>(),

@@ -38,8 +38,7 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
     });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         json!({ "step": row.step, "verdict": row.verdict, "statement": row.statement, "noise_basis": row.noise_basis, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
-            "after_rms_mm": row.after_rms_mm, "not_observable": tables.said(&row.step, VerdictTopic::NotObservable),
-            "withdrawn": tables.said(&row.step, VerdictTopic::Withdrawn), "clock": row.clock })
+            "after_rms_mm": row.after_rms_mm, "not_observable": tables.said(&row.step, VerdictTopic::NotObservable), "clock": row.clock })
     });
     let withdrawn = tables.withdrawn.iter().map(|gone| {
         json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })

@@ -29,7 +29,7 @@ const EXCLUDED: f64 = 0.005;
 
 /// Whether more poses may separate an effect of these tables from others.
 pub fn is_separable_by_poses(effect: &str) -> bool {
-    cause(effect).is_none_or(|cause| cause.about().separable_by_poses)
+    cause(effect).is_none_or(|cause| cause.separable_by_poses)
 }
 
 /// Findings with their ranks.

@@ -11,7 +11,7 @@ pub enum VerdictTopic {
     NotObservable,
     /// What to measure next.
     NextMeasurement,
-    /// A finding that did not stand.
+    /// A finding on torques that the fit of the whole model left without size.
     Withdrawn,
     /// What is odd about the recording.
     Remark,
@@ -45,8 +45,7 @@ impl VerdictSentences {
     /// What a diagnosis of positions says, of the stage `step`.
     pub fn of_positions(step: &str, diagnosis: &Diagnosis) -> Self {
         let next = (VerdictTopic::NextMeasurement, diagnosis.next_measurements.as_slice());
-        let withdrawn = (VerdictTopic::Withdrawn, diagnosis.withdrawn.as_slice());
-        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), next, withdrawn])
+        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), next])
     }
 
     /// The same of a diagnosis of torques.

@@ -6,7 +6,8 @@ use crate::source::{Source, Use, home, sources, uses};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Files that list what belongs to them, and the folder in which their members are.
-const REGISTRIES: [(&str, &str); 1] = [("numerics/effect/form.rs", "numerics/effect/")];
+const REGISTRIES: [(&str, &str); 2] =
+    [("numerics/effect/form.rs", "numerics/effect/"), ("numerics/effect/cause.rs", "numerics/effect/")];
 
 /// File -> file that it uses -> where and by which path.
 type Arrows<'a> = BTreeMap<&'a str, BTreeMap<&'a str, &'a Use>>;

@@ -150,16 +150,16 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
 
 #[test]
 fn what_a_joint_that_slides_errs_by_is_put_over_its_place_in_millimetres() {
-    let law = json!({"of": {"angle": {"joint": 0}}, "basis": {"bump": {"centre": 1.2, "width": 0.3}}});
-    let bump = json!({"unknown": {"motion": {"joint": {"joint": 0}}, "law": law}});
-    let one = FindingRow { place: "joint 1".into(), ..finding(1, "unknown", &json!([bump])) };
-    let (recording, curves) = curves_of(&fixture::on_track(), &[(&bump, &[0.4])], vec![one]);
+    let law = json!({"of": {"angle": {"joint": 0}}, "basis": {"rise": {"centre": 1.2, "width": 0.3}}});
+    let rise = json!({"unknown": {"motion": {"joint": {"joint": 0}}, "law": law}});
+    let one = FindingRow { place: "joint 1".into(), ..finding(1, "unknown", &json!([rise])) };
+    let (recording, curves) = curves_of(&fixture::on_track(), &[(&rise, &[0.4])], vec![one]);
     assert_eq!(curves.0.len(), ROWS);
     for point in &curves.0 {
         let q = recording.q(point.sequence as usize)[0];
         assert_eq!((point.over.as_str(), point.x_unit.as_str(), point.unit.as_str()), ("joint 1", "mm", "mm"));
         assert!((point.x - 1e3 * q).abs() < 1e-9, "{point:?}");
-        let mm = 0.4 * (-((q - 1.2) / 0.3).powi(2)).exp();
+        let mm = 0.4 * ((q - 1.2) / 0.3).tanh();
         assert!((point.fitted - mm).abs() < 1e-6, "{point:?}: {mm} mm");
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion,
-    Polar, ShapeRange, Starts, Survey, Term, Variable, cause,
+    Axes, AxisPoint, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, Law, Laws, Motion, Polar,
+    ShapeRange, Starts, Survey, Term, Variable, cause,
 };
 use calib::robot::{Measurements, PointReadings, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -72,7 +72,14 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
     let warm = Law::new(Variable::Temperature, Basis::Linear { zero: 20.0, per: 1.0 });
     let joint = 2;
     let pairs: Vec<(EffectDeclaration, Form)> = vec![
-        (declaration("joint 3", "angle", &["sin(3 * q)", "cos(3 * q)"]), GearCyclic::term(joint, 3, false).into()),
+        (
+            declaration("joint 3", "angle", &["sin(3 * q)", "cos(3 * q)"]),
+            term(
+                "gear_cyclic",
+                Motion::Joint { joint },
+                Law::new(Variable::Angle { joint }, Basis::Wave { order: 3, overtone: false }),
+            ),
+        ),
         (
             declaration("joint 3", "angle", &["(temperature - 20) * q"]),
             term("joint_warming", Motion::Joint { joint }, warm.times(Variable::Angle { joint }, Basis::PROPORTIONAL)),
@@ -171,7 +178,7 @@ fn a_declaration_says_what_it_needs_and_is_not_tried_without() {
     let robot = RobotModel::new(fixture::spherical());
     let mut data = data(&robot);
     let declared = declaration("joint", "angle", &["lagging(300) * q"]);
-    let about = calib::effect::Cause::about(DeclaredCause::of(&declared).expect("a cause"));
+    let about = DeclaredCause::of(&declared).expect("a cause").about();
     assert_eq!((about.name, about.needs, about.formula), ("own_effect", "temperature", "lagging(300) * q"));
     assert_eq!(forms(&declared, &robot, &data).len(), robot.joints());
     // The first joint has none before it.

@@ -9,7 +9,6 @@ mod links;
 mod reference;
 mod seat_compliance;
 mod settings;
-mod signature;
 mod stages;
 mod tables;
 mod typed;

@@ -1,7 +1,7 @@
 //! How rare causes are, and how many forms of a kind are tried, where that is no count of what is listed beside it.
 //!
 //! A form's price is twice the logarithm of how many like it are tried at its place, and a class of rarity, -2 ln of its odds beside
-//! the commonest causes. Classes are by a rule of thumb: one in 3, 7, 20, 50, 150 and 400.
+//! the commonest causes. Classes are by a rule of thumb: one in 3, 7, 20 and 150.
 
 use super::CriterionValue;
 use super::table::criteria;
@@ -15,12 +15,8 @@ criteria! {
     RARE: f64 = 4.0, "-2 ln of odds", "judgement: a class of rarity", "changes nothing on 2";
     /// One in twenty: what needs a fault of build (a joint that drives one far from it, a link that grows askew, a loose load).
     RARER: f64 = 6.0, "-2 ln of odds", "judgement: a class of rarity", "";
-    /// One in fifty: physics outside the library.
-    OPEN: f64 = 8.0, "-2 ln of odds", "judgement: a class of rarity", "changes nothing on 2";
     /// One in 150: a stubby wrist link that bends.
     UNLIKELY: f64 = 10.0, "-2 ln of odds", "judgement: a class of rarity", "";
-    /// One in 400: what nearly always is another cause of the list (the wobble of another joint's axis, the weight of links).
-    HARDLY_EVER: f64 = 12.0, "-2 ln of odds", "judgement: a class of rarity", "changes nothing on 2";
     /// Low orders of a gear with either kind of wheel, and orders in another joint's angle.
     LOW_ORDERS: usize = 6, "forms", "count: three orders of two kinds", "changes nothing on 2";
     /// Orders, axes and ways in which an axis wobbles.

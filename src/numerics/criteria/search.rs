@@ -11,8 +11,6 @@ criteria! {
     LEVELS: i32 = 10, "levels", "count: steps fall to a thirtieth", "";
     /// Levels of refinement in a row that may bring nothing.
     IDLE: usize = 3, "levels", "judgement: bounds time", "";
-    /// Levels of refinement of a rival's shape.
-    RIVAL_LEVELS: i32 = 8, "levels", "count: steps fall to a sixteenth", "";
     /// Fewest rows to fit: geometry alone takes some thirty parameters from three of each row.
     FEWEST: usize = 15, "rows", "count: some thirty parameters, three values a row", "";
 }

@@ -9,12 +9,6 @@ criteria! {
     NOT_NOISE: f64 = 4.0, "ratio", "judgement: no tracker is four times worse than stated", "";
     /// What has no name explains nothing where it is more than this share of what was found.
     NAMELESS: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
-    /// Orders that a smooth function of an angle may have, too.
-    SLOW: u32 = 2, "orders", "count: two periods", "";
-    /// Less than this share of a finding's gain at its own joint is its finer shape.
-    REFINEMENT: f64 = 0.1, "share of the gain", "judgement: a tenth", "changes nothing on 2";
-    /// Less than this share of the gain of a lag of all joints, anywhere, is its trace.
-    TRACE: f64 = 0.05, "share of the gain", "judgement: a twentieth", "";
     /// The radius, and the place along the axis, may change by this share of the displacement.
     CONSTANT: f64 = 0.1, "share", "judgement: a tenth", "";
     /// Causes of a round that are named.

@@ -11,9 +11,10 @@
 
 mod closed_form;
 mod judge;
+mod linear;
 mod misfit;
 mod outside;
-mod pool;
+mod regression;
 mod round;
 mod separate;
 mod setup;

@@ -1,17 +1,15 @@
 //! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should separate.
 
-use super::pool::HypothesisSet;
+use super::regression::{Regression, Solution};
 use super::round::compliance;
+use super::table::forms_of;
+use super::types::Question;
 use super::whitened::WhitenedProblem;
-use crate::criteria::search::RIVAL_LEVELS;
-use crate::effect::{
-    Cause, DeclaredCause, DeclaredForm, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown,
-    arm_effect, hypotheses,
-};
+use crate::criteria::cells::USUAL;
+use crate::effect::{DeclaredCause, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, arm_effect};
 use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, DiscriminationProblem};
 use crate::robot::Measurements;
-use std::collections::BTreeSet;
 
 /// A diagnosed model where it stands.
 pub struct DiagnosedModel<'a> {
@@ -47,63 +45,60 @@ pub fn discrimination_problem(
     }
     let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
     let jacobian = problem.jacobian(&nuisances);
-    let rivals = rivals(&survey, model, (effect, place), finding)?;
     let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let mut pool = HypothesisSet::new(&problem, &jacobian, &open, rivals);
-    let Some((_, mut best)) = best(&pool, 0) else { return Err(format!("no form of {effect} at {place} can be tried")) };
-    for level in 0..*RIVAL_LEVELS {
-        let own = pool.hypotheses[best].clone();
-        let near = own.form.near(&survey, level).into_iter().map(|form| Hypothesis { form, ..own.clone() });
-        let first = pool.add(near.collect());
-        match self::best(&pool, first) {
-            Some((score, k)) if score < self::score(&pool, best) => best = k,
-            _ => (),
-        }
-    }
-    let fitted = pool.solve(&[best]).coefficients;
-    let rival = &pool.hypotheses[best];
-    let both = with(model, &rival.form);
-    let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
+    let beside = Regression::new(&problem, &jacobian, &[], &open);
+    let others =
+        rivals(&survey, &problem, model, (effect, place))?.into_iter().filter(|form| finding != std::slice::from_ref(form));
+    let fitted = others.map(|form| (beside.solve(&form), form));
+    let best = fitted.min_by(|a, b| score(&beside, &a.0).total_cmp(&score(&beside, &b.0)));
+    let Some((_, form)) = best else { return Err(format!("no form of {effect} at {place} can be tried")) };
+    let rival = beside.refined(form, &survey);
+    let both = with(model, &rival);
+    let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival));
     let of_rival: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
     let sizes = own.iter().map(|k| model.x[*k]).collect();
-    let sides = [Alternative { parameters: own, sizes }, Alternative { parameters: of_rival, sizes: fitted }];
-    Ok((DiscriminationProblem { model: both, nuisances, sides }, rival.form.clone()))
+    let sides =
+        [Alternative { parameters: own, sizes }, Alternative { parameters: of_rival, sizes: beside.solve(&rival).coefficients }];
+    Ok((DiscriminationProblem { model: both, nuisances, sides }, rival))
 }
 
-/// How well one form fits, with a penalty for every parameter.
-fn score(pool: &HypothesisSet, k: usize) -> f64 {
-    let (solution, rows) = (pool.solve(&[k]), pool.residual_rows as f64);
-    rows * ((pool.square - solution.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * solution.rank as f64
+/// How well one form fits, with a penalty for every parameter (Schwarz, 1978).
+fn score(beside: &Regression, of: &Solution) -> f64 {
+    let rows = beside.rows() as f64;
+    rows * ((beside.square - of.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * of.rank as f64
 }
 
-/// The best of the forms from `first` on, with its score.
-fn best(pool: &HypothesisSet, first: usize) -> Option<(f64, usize)> {
-    (first..pool.hypotheses.len()).map(|k| (score(pool, k), k)).min_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// All that diagnosis would try under this name at this place.
-fn rivals(survey: &Survey, model: &Model, (effect, place): (&str, Place), finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
-    // What is called by its shape alone.
-    let named = |form: &Form| form.name() == effect || form.is(&Unknown) && form.called(&[], survey) == effect;
+/// The forms of this name at this place, as diagnosis has them.
+fn rivals(
+    survey: &Survey,
+    problem: &WhitenedProblem,
+    model: &Model,
+    (effect, place): (&str, Place),
+) -> Result<Vec<Form>, String> {
     let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| Some(other.form()?.declared()?.declaration());
     let mut own: Vec<&'static DeclaredCause> = model.stack.effects().filter_map(declared).collect();
-    own.dedup_by_key(|cause| cause.name());
-    let own = own.into_iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey));
-    let all = hypotheses(survey).into_iter().chain(own).filter(|hypothesis| named(&hypothesis.form));
-    let all: Vec<Hypothesis> = all.filter(|hypothesis| finding != std::slice::from_ref(&hypothesis.form)).collect();
-    let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| hypothesis.form.place() == place).cloned().collect();
-    if !own.is_empty() {
-        return Ok(own);
-    }
-    let places: BTreeSet<Place> = all.iter().map(|hypothesis| hypothesis.form.place()).collect();
-    if places.is_empty() {
-        return Err(format!("{effect} cannot be tried on this robot and recording"));
-    }
-    Err(format!(
-        "{effect} has no place `{place}` here; allowed: {}",
-        places.iter().map(Place::to_string).collect::<Vec<_>>().join(", ")
-    ))
+    own.dedup_by_key(|cause| &cause.declaration().name);
+    let question = Question {
+        robot: survey.robot,
+        data: survey.data,
+        fit: survey.rows,
+        validate: &[],
+        set: &[],
+        prior_weight: 1.0,
+        open_world: *USUAL,
+        without: &[],
+        own: &own,
+        beside_simulation: false,
+        seed: 0,
+    };
+    forms_of((effect, place), &question, survey, problem).map_err(|places| {
+        if places.is_empty() {
+            return format!("{effect} cannot be tried on this robot and recording");
+        }
+        let allowed: Vec<String> = places.iter().map(Place::to_string).collect();
+        format!("{effect} has no place `{place}` here; allowed: {}", allowed.join(", "))
+    })
 }
 
 /// The model with one form more, at zero, where it has it not.

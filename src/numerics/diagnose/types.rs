@@ -136,11 +136,6 @@ impl Finding {
     pub fn is_physics(&self) -> bool {
         self.evidence.is_some() && (self.place != Place::Recording || self.effect == names::UNKNOWN)
     }
-
-    /// Whether nothing but a shape stands behind it.
-    pub fn has_no_law(&self) -> bool {
-        !self.forms.is_empty() && self.forms.iter().all(|form| form.cause().is_nameless())
-    }
 }
 
 /// The likeliest of all cells at a place, or of a variable.
@@ -262,8 +257,6 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Formulas for findings without a name, those of a finding cheapest first.
     pub formulas: Vec<ClosedForm>,
-    /// Findings that are not in the model, a sentence each; a search drops what does not pay and states none.
-    pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.
     pub clock: bool,
     /// Rows that no smooth model can follow.

@@ -35,7 +35,6 @@ pub(super) fn unasked(
         held_out: misfit.held_out,
         folds: None,
         findings: Vec::new(),
-        withdrawn: Vec::new(),
         clock: data.has_clock(),
         not_observable: Vec::new(),
         signature: None,

@@ -3,7 +3,7 @@
 //! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
 //! centre and `radius`.
 
-use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
+use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
 use crate::robot::{Anchor, RobotModel, Shape};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -25,18 +25,6 @@ impl AnchorShift {
             Shape::Plane(_) => &["offset", "rx", "ry"],
             Shape::Sphere(_) => &["x", "y", "z", "radius"],
         }
-    }
-}
-
-impl Cause for AnchorShift {
-    about! {
-        name: names::ANCHOR,
-        place: "anchor",
-        formula: "what is measured from is elsewhere: the end of a draw-wire or ballbar, a socket, a plane, a sphere; it moves no point",
-        size: "any",
-        confounded: "base_frame",
-        needs: "distances, sockets, planes or spheres",
-        arm_effect: Some(|_| Box::new(AnchorShift)),
     }
 }
 

@@ -1,14 +1,12 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::placed;
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-pub struct BaseCompliance;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TiltingBase {
@@ -24,30 +22,26 @@ const DEPTHS: [f64; 2] = [0.0, 0.6];
 const STEP: f64 = 0.3;
 const DEEPEST: f64 = 3.0;
 
-impl Cause for BaseCompliance {
-    about! {
-        name: names::BASE_COMPLIANCE,
-        place: "base",
-        formula: "the base tilts about its origin, or a point below, by the moment on it",
-        size: "0.01 to 1 urad/Nm",
-        confounded: "joint_compliance of joint 2, link_compliance of link 1",
-        needs: "link masses",
-        read: Some(Form::kept::<TiltingBase>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::BASE_COMPLIANCE,
+    place: "base",
+    formula: "the base tilts about its origin, or a point below, by the moment on it",
+    size: "0.01 to 1 urad/Nm",
+    confounded: "joint_compliance of joint 2, link_compliance of link 1",
+    needs: "link masses",
+    sentence: "the base tilts under the arm's weight by {value}",
+    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<TiltingBase> }),
+    ..Cause::PLAIN
+};
 
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let loaded = (0..survey.joints()).any(|joint| survey.is_loaded(joint));
-        let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| TiltingBase { two, below }));
-        forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        format!("the base tilts under the arm's weight by {}", summary.value())
-    }
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let loaded = (0..survey.joints()).any(|joint| survey.is_loaded(joint));
+    let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| TiltingBase { two, below }));
+    forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
 }
 
 impl Placed for TiltingBase {
-    placed! { self: Place::Base, &BaseCompliance, [Variable::ArmLoad], self }
+    placed! { self: Place::Base, &CAUSE, [Variable::ArmLoad], self }
 
     /// The first link bends as the base tilts.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {

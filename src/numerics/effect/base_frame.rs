@@ -1,13 +1,10 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
+use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
 use nalgebra::Vector3;
-
-/// Where the base stands.
-pub struct BaseFrame;
 
 /// Corrections to a starting pose: exp of the twist, given in tracker axes, applied in the base frame.
 #[derive(Debug, Clone, Copy)]
@@ -37,18 +34,6 @@ impl BasePlacement {
         let mut twist = Twist::zeros();
         twist.fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 }).copy_from(&local);
         twist
-    }
-}
-
-impl Cause for BaseFrame {
-    about! {
-        name: names::BASE_FRAME,
-        place: "base",
-        formula: "a rigid motion of the base",
-        size: "any",
-        confounded: "tool_offset, joint_offset of the first joint",
-        needs: "-",
-        arm_effect: Some(|setting| Box::new(BasePlacement { start: setting.base })),
     }
 }
 

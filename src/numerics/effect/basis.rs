@@ -51,48 +51,12 @@ pub enum Basis {
         /// How many functions, the constant among them.
         count: usize,
     },
-    /// The cosines, fading out beyond either end within one wave of the highest cosine, and straight across gaps.
-    Fading {
-        /// Lower end of the support.
-        low: f64,
-        /// Upper end of the support.
-        high: f64,
-        /// How many cosines.
-        count: usize,
-        /// Stretches that no row supports.
-        #[serde(default, skip_serializing_if = "Gaps::are_none")]
-        gaps: Gaps,
-    },
-    /// 1 between two knots, else 0; one function for each stretch, below the first knot and above the last, too.
-    Steps {
-        /// Where it steps.
-        knots: Knots,
-    },
-    /// 1 at a knot and 0 at all others, straight between them and held beyond the first and the last; one function for each knot.
-    Corners {
-        /// Where straight pieces meet, both ends among them.
-        knots: Knots,
-    },
-    /// exp(-((u - centre) / width)^2).
-    Bump {
-        /// Its middle.
-        centre: f64,
-        /// Its scale.
-        width: f64,
-    },
     /// tanh((u - centre) / width): one level below, another above.
     Rise {
         /// Its middle.
         centre: f64,
         /// Its scale.
         width: f64,
-    },
-    /// Nothing on one side of `from`, in proportion to the distance on the other.
-    Hinge {
-        /// Where it begins.
-        from: f64,
-        /// Whether it grows above, or below.
-        upwards: bool,
     },
     /// 1 above `at`, else 0.
     After {
@@ -128,79 +92,6 @@ pub enum Basis {
     },
 }
 
-/// Some values of a variable, ascending.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
-pub struct Knots {
-    at: [f64; Knots::MOST],
-    count: usize,
-}
-
-impl Knots {
-    /// How many there are at most.
-    pub const MOST: usize = 6;
-
-    /// The first of some values, ascending.
-    pub fn new(values: impl IntoIterator<Item = f64>) -> Self {
-        let mut out = Self { at: [0.0; Self::MOST], count: 0 };
-        for (to, value) in out.at.iter_mut().zip(values) {
-            *to = value;
-            out.count += 1;
-        }
-        out.at[..out.count].sort_by(f64::total_cmp);
-        out
-    }
-
-    /// All of them.
-    pub fn all(&self) -> &[f64] {
-        &self.at[..self.count]
-    }
-
-    /// Without the first and the last.
-    pub fn inner(&self) -> &[f64] {
-        self.all().get(1..self.count.saturating_sub(1)).unwrap_or_default()
-    }
-}
-
-impl TryFrom<Vec<f64>> for Knots {
-    type Error = String;
-
-    fn try_from(values: Vec<f64>) -> Result<Self, String> {
-        if values.is_empty() || values.len() > Self::MOST {
-            return Err(format!("{} knots: from 1 to {} are allowed", values.len(), Self::MOST));
-        }
-        Ok(Self::new(values))
-    }
-}
-
-impl From<Knots> for Vec<f64> {
-    fn from(knots: Knots) -> Self {
-        knots.all().to_vec()
-    }
-}
-
-/// Stretches of a curve's variable without support; none where both ends are one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Gaps(pub [[f64; 2]; 2]);
-
-impl Gaps {
-    fn are_none(&self) -> bool {
-        self.0.iter().all(|[low, high]| low == high)
-    }
-
-    /// Where a curve is looked at instead of `u`, and with which weights: at both ends of a gap, a straight line between them, which is
-    /// the stiffest curve that they allow.
-    fn ends(&self, u: f64) -> [(f64, f64); 2] {
-        match self.0.iter().find(|[low, high]| u > *low && u < *high) {
-            Some([low, high]) => {
-                let share = (u - low) / (high - low);
-                [(*low, 1.0 - share), (*high, share)]
-            }
-            None => [(u, 1.0), (u, 0.0)],
-        }
-    }
-}
-
 /// Lengths of the recording, from its start, over which a creep is believed to go on.
 const CREEPING: f64 = 2.0;
 
@@ -214,19 +105,14 @@ impl Basis {
             Self::Straight { .. } => 2,
             Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
             Self::Sway { .. } => 2,
-            Self::Cosines { count, .. } | Self::Series { count, .. } | Self::Fading { count, .. } => *count,
-            Self::Steps { knots } => knots.count + 1,
-            Self::Corners { knots } => knots.count,
+            Self::Cosines { count, .. } | Self::Series { count, .. } => *count,
             _ => 1,
         }
     }
 
     /// Whether it is a free curve.
     pub fn is_curve(&self) -> bool {
-        matches!(
-            self,
-            Self::Cosines { .. } | Self::Series { .. } | Self::Fading { .. } | Self::Steps { .. } | Self::Corners { .. }
-        )
+        matches!(self, Self::Cosines { .. } | Self::Series { .. })
     }
 
     /// The values of its functions at `u`, numbered.
@@ -256,45 +142,7 @@ impl Basis {
                 each(0, 1.0);
                 cosines(u, [low, high], count.saturating_sub(1)).enumerate().for_each(|(k, value)| each(k + 1, value));
             }
-            Self::Fading { low, high, count, gaps } => {
-                let wave = 2.0 * (high - low) / count as f64;
-                let beyond = (low - u).max(u - high).clamp(0.0, wave);
-                let share = if beyond > 0.0 { 0.5 + 0.5 * libm::cos(PI * beyond / wave) } else { 1.0 };
-                let [(a, own), (b, other)] = gaps.ends(u);
-                let from = cosines(a, [low, high], count);
-                if other == 0.0 {
-                    from.enumerate().for_each(|(k, value)| each(k, share * value));
-                } else {
-                    let straight = from.zip(cosines(b, [low, high], count)).map(|(from, to)| own * from + other * to);
-                    straight.enumerate().for_each(|(k, value)| each(k, share * value));
-                }
-            }
-            Self::Steps { knots } => {
-                let own = knots.all().iter().filter(|at| u > **at).count();
-                (0..=knots.count).for_each(|k| each(k, f64::from(u8::from(k == own))));
-            }
-            Self::Corners { knots } => {
-                let all = knots.all();
-                let above = all.partition_point(|at| *at < u).clamp(1, knots.count.max(2) - 1);
-                let [low, high] = [above - 1, above].map(|k| all[k.min(knots.count - 1)]);
-                let share = ((u - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                let value = |k: usize| {
-                    if k == above {
-                        share
-                    } else if k + 1 == above {
-                        1.0 - share
-                    } else {
-                        0.0
-                    }
-                };
-                (0..knots.count).for_each(|k| each(k, value(k)));
-            }
-            Self::Bump { centre, width } => {
-                let distance = (u - centre) / width;
-                each(0, libm::exp(-distance * distance));
-            }
             Self::Rise { centre, width } => each(0, libm::tanh((u - centre) / width)),
-            Self::Hinge { from, upwards } => each(0, if upwards { (u - from).max(0.0) } else { (from - u).max(0.0) }),
             Self::After { at } => each(0, f64::from(u > at)),
             Self::Sign => each(0, u.signum()),
             Self::Power { start, end, exponent } => {
@@ -331,52 +179,11 @@ pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]:
 mod tests {
     use super::*;
 
-    fn values(basis: Basis, u: f64) -> Vec<f64> {
-        let mut out = vec![0.0; basis.count()];
-        basis.at(u, &mut |k, value| out[k] = value);
-        out
-    }
-
     #[test]
     fn cosines_of_high_orders_are_those_of_the_library() {
         for (u, order) in [(0.3, 1), (1.7, 40), (2.9, 180), (3.0, 200)] {
             let value = cosines(u, [0.0, PI], order).last().expect("one");
             assert!((value - libm::cos(order as f64 * u)).abs() < 1e-13, "{u} {order}");
         }
-    }
-
-    #[test]
-    fn steps_and_corners_are_what_their_knots_say_and_stay_so_in_json() {
-        let steps = Basis::Steps { knots: Knots::new([0.5, -0.5]) };
-        assert_eq!([-1.0, 0.0, 0.6].map(|u| values(steps, u)), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let corners = Basis::Corners { knots: Knots::new([-1.0, 0.0, 1.0]) };
-        let hats = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.75, 0.25], [0.0, 0.0, 1.0]];
-        assert_eq!([-3.0, -0.5, 0.25, 7.0].map(|u| values(corners, u)), hats);
-        let inner = |knots: &[f64]| Knots::new(knots.iter().copied()).inner().to_vec();
-        assert_eq!([inner(&[1.0]), inner(&[1.0, 2.0]), inner(&[3.0, 1.0, 2.0])], [vec![], vec![], vec![2.0]]);
-        for basis in [steps, corners] {
-            let text = serde_json::to_string(&basis).expect("JSON");
-            assert_eq!(serde_json::from_str::<Basis>(&text).expect("the same"), basis, "{text}");
-        }
-        let error = serde_json::from_str::<Basis>(r#"{"steps": {"knots": []}}"#).expect_err("no knots");
-        assert!(error.to_string().starts_with("0 knots: from 1 to 6 are allowed"), "{error}");
-    }
-
-    #[test]
-    fn a_curve_is_straight_across_a_gap_and_as_before_beside_it() {
-        let (low, high, count) = (-1.0, 2.0, 12);
-        let plain = Basis::Fading { low, high, count, gaps: Gaps::default() };
-        let bridged = Basis::Fading { low, high, count, gaps: Gaps([[0.25, 0.75], [0.0; 2]]) };
-        for u in [-1.2, -0.5, 0.25, 0.75, 1.9, 2.1] {
-            assert_eq!(values(bridged, u), values(plain, u), "{u}");
-        }
-        let (from, to, middle) = (values(plain, 0.25), values(plain, 0.75), values(bridged, 0.5));
-        for ((from, to), middle) in from.iter().zip(to).zip(middle) {
-            assert!((middle - 0.5 * (from + to)).abs() < 1e-12, "{middle}");
-        }
-        let text = serde_json::to_string(&plain).expect("JSON");
-        assert!(!text.contains("gaps"), "{text}");
-        assert_eq!(serde_json::from_str::<Basis>(&text).expect("the same"), plain);
-        assert_eq!(serde_json::from_str::<Basis>(&serde_json::to_string(&bridged).expect("JSON")).expect("the same"), bridged);
     }
 }

@@ -1,11 +1,15 @@
-//! Causes of error: everything that the project knows of one stands in the file that implements [`Cause`], and every cause in one list.
+//! Causes of error: what each is stands in its row of the [table](CAUSES).
 
-use super::*;
-use crate::criteria::words::REFINEMENT;
+use super::law_row::LawRow;
+use super::{
+    CAUSES, Effect, EffectContext, Form, HiddenSize, Hypothesis, NumberSpec, Place, Summary, Survey, Term, Variable, names,
+};
+use super::{law_row, sentence, unknown};
+use crate::robot::RobotModel;
 
-/// What a cause is: in words, and in what diagnosis asks of every cause.
-#[derive(Debug, Clone, Copy)]
-pub struct CauseDescription {
+/// A cause: in words, and where it acts by which laws.
+#[derive(Debug)]
+pub struct Cause {
     /// Canonical name.
     pub name: &'static str,
     /// Where it sits.
@@ -18,51 +22,35 @@ pub struct CauseDescription {
     pub confounded: &'static str,
     /// Columns of the recording and entries of the robot file without which it cannot be told.
     pub needs: &'static str,
+    /// What a mechanic is told of a finding, without its size at the tool: words with [holes](sentence::hole). Its laws may say more.
+    pub sentence: &'static str,
+    /// Where it acts, and what it follows there.
+    pub laws: &'static [LawRow],
     /// Whether it belongs to one measurement and not to the arm.
     pub of_the_measurement: bool,
     /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
     pub separable_by_poses: bool,
-    /// The size (one sigma, SI) that the coefficients of a law are held to where the rows do not determine them; nothing where they are
-    /// free.
-    pub prior_sigma: Option<f64>,
-    /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
-    pub absorbs_residual: &'static [&'static str],
     /// What separates it from others beside more poses.
     pub measure: Option<Measure>,
     /// The effect of the whole arm, for causes that are identified, not searched for.
     pub arm_effect: Option<ArmEffectOf>,
-    /// Reads its forms, where they are no [`Term`], as [`Placed::body`] wrote them.
-    pub read: Option<fn(&serde_json::Value) -> serde_json::Result<Form>>,
+    /// How large it may be where it is not found, on a path that is short or slow.
+    pub hidden: Option<fn() -> HiddenSize>,
+    /// Another cause that does the same as a law of this one in whatever data: an identity of kinematics or statics.
+    pub same: fn(&Term) -> Option<(&'static str, Place)>,
+    /// The motion of a cause that is no product of the columns of laws.
+    pub motion: Option<MotionRow>,
 }
 
-impl CauseDescription {
-    /// What most causes are, without words.
-    pub const PLAIN: Self = Self {
-        name: "",
-        place: "",
-        formula: "",
-        size: "",
-        confounded: "",
-        needs: "",
-        of_the_measurement: false,
-        separable_by_poses: true,
-        prior_sigma: None,
-        absorbs_residual: &[],
-        measure: None,
-        arm_effect: None,
-        read: None,
-    };
-}
-
-/// Writes what a cause is, [`Cause::about`](crate::effect::Cause::about): `about! { name: "backlash", place: "joint" }`. What it does not say is
-/// as of most causes, [`CauseDescription::PLAIN`](crate::effect::CauseDescription::PLAIN).
-#[macro_export]
-macro_rules! about {
-    ($($field:ident: $value:expr),+ $(,)?) => {
-        fn about(&self) -> &'static $crate::effect::CauseDescription {
-            &$crate::effect::CauseDescription { $($field: $value,)+ ..$crate::effect::CauseDescription::PLAIN }
-        }
-    };
+/// A motion with physics of its own.
+#[derive(Debug)]
+pub struct MotionRow {
+    /// Every hypothesis that a recording can speak of.
+    pub propose: fn(&Survey) -> Vec<Hypothesis>,
+    /// What a mechanic is told of a finding; `None`: what the row says.
+    pub sentence: Option<fn(&Summary) -> String>,
+    /// Reads its forms as [`Placed::body`](super::Placed::body) wrote them.
+    pub read: fn(&serde_json::Value) -> serde_json::Result<Form>,
 }
 
 /// The effect of the whole arm in a setting.
@@ -77,165 +65,92 @@ pub struct Measure {
     pub advice: &'static str,
 }
 
-/// Name, unit and one sigma of what is known before any measurement (SI), of a coefficient.
-pub type NumberSpec = (String, Unit, f64);
-
-/// A cause of error.
-pub trait Cause: Sync {
-    /// What it is.
-    fn about(&self) -> &'static CauseDescription;
+impl Cause {
+    /// What most causes are, without words.
+    pub const PLAIN: Self = Self {
+        name: "",
+        place: "",
+        formula: "",
+        size: "any",
+        confounded: "-",
+        needs: "-",
+        sentence: "",
+        laws: &[],
+        of_the_measurement: false,
+        separable_by_poses: true,
+        measure: None,
+        arm_effect: None,
+        hidden: None,
+        same: |_| None,
+        motion: None,
+    };
 
     /// Its canonical name.
-    fn name(&self) -> &'static str {
-        self.about().name
-    }
-
-    /// See [`CauseDescription::arm_effect`].
-    fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
-        self.about().arm_effect.map(|make| make(setting))
-    }
-
-    /// Every hypothesis that the recording can speak of; those of one place are the shapes of one cell of a diagnosis.
-    fn propose(&self, _survey: &Survey) -> Vec<Hypothesis> {
-        Vec::new()
-    }
-
-    /// What a mechanic is told of a finding, without its size at the tool.
-    fn sentence(&self, summary: &Summary) -> String {
-        format!("{} at {}", self.name(), summary.place)
-    }
-
-    /// Whether it is how a joint yields to its load torque: errors of the torque model move nothing without.
-    fn yields_to_torque(&self) -> bool {
-        false
-    }
-
-    /// Whether a form of it, with its like at other joints, takes up whatever else depends on loads.
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        false
+    pub fn name(&self) -> &'static str {
+        self.name
     }
 
     /// Whether its forms describe something that is in no list.
-    fn is_nameless(&self) -> bool {
-        false
+    pub fn is_nameless(&self) -> bool {
+        self.name == names::UNKNOWN
     }
 
-    /// [`CauseDescription::prior_sigma`] of one of its terms.
-    fn prior_sigma(&self, _term: &Term) -> Option<f64> {
-        self.about().prior_sigma
+    /// Every hypothesis that the recording can speak of; those of one place are the shapes of one cell of a diagnosis.
+    pub fn propose(&'static self, survey: &Survey) -> Vec<Hypothesis> {
+        let of_laws = self.laws.iter().flat_map(|law| law.propose(self, survey));
+        of_laws.chain(self.motion.iter().flat_map(|motion| (motion.propose)(survey))).collect()
     }
 
-    /// The share of the gain of a finding of this name below which `part`, found beside it, is its finer shape.
-    fn absorbs_below(&self, own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (own.place == part.place && self.about().absorbs_residual.contains(&part.name)).then_some(*REFINEMENT)
-    }
-
-    /// Whether `part` is a part of the finding `own`, which has this cause's name or a form of it, whatever it gains.
-    fn has_part(&self, _own: &NamedForms, _part: &NamedForms, _survey: &Survey) -> bool {
-        false
-    }
-
-    /// The cause of fewer numbers that stands in the place of this one where it explains as well.
-    fn simpler(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Whether one form may stand in for two others: a free curve, or the bending of a link for the wind-up of two joints.
-    fn stands_in_for_two(&self) -> bool {
-        self.is_nameless()
-    }
-
-    /// What a finding that is made of forms of this cause is in the fitted model as a whole.
-    fn in_the_model(&self, _fitted: &FittedForms) -> Option<ModelledFinding> {
-        None
-    }
-
-    /// How large a form that was not found may be where geometry takes up most of what it does.
-    fn hidden(&self, _form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
-        None
-    }
-
-    /// Other causes that do the same as a term of this one, named `called`, in whatever data: identities of kinematics and statics.
-    fn identities(&self, _term: &Term, _called: &str) -> Vec<(&'static str, Place)> {
-        Vec::new()
-    }
-
-    /// The coefficients of a term of this cause; those of a frame's motion unless it says others.
-    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        term.motion().frame_numbers(str::to_string)
-    }
-
-    /// See [`Placed::near`]; laws that step, settle or lag have the same neighbours whatever their cause.
-    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        match term.basis() {
-            Basis::After { .. } => change::near(term, survey),
-            _ => warmth::near(term, survey, level),
+    /// What a mechanic is told of a finding, without its size at the tool.
+    pub fn sentence(&self, summary: &Summary) -> String {
+        match self.motion.as_ref().and_then(|motion| motion.sentence) {
+            Some(own) => own(summary),
+            None => sentence::of(self, summary),
         }
     }
 
-    /// See [`Placed::variant`]; that of a wave is its order.
-    fn variant(&self, term: &Term) -> String {
-        orders::variant(term)
+    /// The effect of the whole arm in a setting, if it is one.
+    pub fn arm_effect(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
+        self.arm_effect.map(|make| make(setting))
     }
 
-    /// Why a term with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the
-    /// recording holds. Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
-    fn impossible(&self, _term: &Term, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
-        None
+    /// How large a form that was not found may be where geometry takes up most of what it does: of what follows the speed of joints that
+    /// turn, or of all.
+    pub fn hidden(&self, form: &Form, robot: &RobotModel) -> Option<HiddenSize> {
+        let of_speed = form.variables().iter().all(|of| matches!(of, Variable::Speed | Variable::Velocity { .. }));
+        let turns = !matches!(form.place(), Place::Joint(joint) if !robot.is_revolute(joint));
+        self.hidden.filter(|_| of_speed && turns).map(|size| size())
     }
 
-    /// See [`Placed::called`].
-    fn called(&self, _term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
-        self.name()
+    /// The row of a term of this cause; none of what has no name.
+    pub(super) fn law(&self, term: &Term) -> Option<&'static LawRow> {
+        self.laws.iter().find(|law| law.is(term))
+    }
+
+    /// The coefficients of a term of this cause.
+    pub(super) fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
+        self.law(term).map_or_else(|| unknown::numbers(term, robot), |law| law.numbers(term, robot))
+    }
+
+    /// See [`Placed::variant`](super::Placed::variant).
+    pub(super) fn variant(&self, term: &Term) -> String {
+        self.law(term).map_or_else(|| unknown::variant(term), |law| law.variant(term))
+    }
+
+    /// See [`Placed::near`](super::Placed::near); the shapes of a curve without a name are those of its cell.
+    pub(super) fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        if self.is_nameless() { Vec::new() } else { law_row::near(term, survey, level) }
+    }
+
+    /// See [`Placed::identities`](super::Placed::identities).
+    pub(super) fn identities(&self, term: &Term, called: &str) -> Vec<(&'static str, Place)> {
+        if self.is_nameless() { unknown::identities(term, called) } else { (self.same)(term).into_iter().collect() }
     }
 }
 
-/// Every cause, in the order in which a model is built up. Where two parameters do the same, the one whose cause comes first is kept.
-pub const CAUSES: &[&dyn Cause] = &[
-    &anchor::AnchorShift,
-    &base_frame::BaseFrame,
-    &tool_offset::ToolOffset,
-    &joint_offset::JointOffset,
-    &link_geometry::LinkGeometry,
-    &reduction_ratio::ReductionRatio,
-    &coupling_ratio::CouplingRatio,
-    &joint_compliance::JointCompliance,
-    &joint_hardening::JointHardening,
-    &link_compliance::LinkCompliance,
-    &base_compliance::BaseCompliance,
-    &gear_cyclic::GearCyclic,
-    &gear_motor_cyclic::GearMotorCyclic,
-    &gear_flank::GearFlank,
-    &gear_load::GearLoad,
-    &joint_table::JointTable,
-    &backlash::Backlash,
-    &presliding::Presliding,
-    &thermal_growth::ThermalGrowth,
-    &joint_warming::JointWarming,
-    &counterbalance::Counterbalance,
-    &cable_drag::CableDrag,
-    &link_mass::LinkMass,
-    &payload_error::PayloadError,
-    &axis_wobble::AxisWobble,
-    &viscous_windup::ViscousWindup,
-    &zero_shift::ZeroShift,
-    &tool_shift::ToolShift,
-    &base_shift::BaseShift,
-    &tracker_drift::TrackerDrift,
-    &tracker_scale::TrackerScale,
-    &tracker_circle::TrackerCircle,
-    &tracker_elevation::TrackerElevation,
-    &tracker_offset::TrackerOffset,
-    &tracker_refraction::TrackerRefraction,
-    &joint_log_lag::JointLogLag,
-    &wrong_point::Outlier,
-    &wrong_point::MislabelledPoint,
-    &unknown::Unknown,
-];
-
 /// The cause of a canonical name.
-pub fn cause(name: &str) -> Option<&'static dyn Cause> {
-    CAUSES.iter().copied().find(|cause| cause.name() == name)
+pub fn cause(name: &str) -> Option<&'static Cause> {
+    CAUSES.iter().copied().find(|cause| cause.name == name)
 }
 
 /// The effect of the whole arm of a name, if there is one.
@@ -244,12 +159,6 @@ pub fn arm_effect(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>
 }
 
 /// Causes that are effects of the whole arm, which are identified; all others are searched for.
-pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
-    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
-    CAUSES.iter().copied().filter(move |cause| cause.arm_effect(&setting).is_some())
-}
-
-/// Every hypothesis of every cause.
-pub fn hypotheses(survey: &Survey) -> Vec<Hypothesis> {
-    CAUSES.iter().flat_map(|cause| cause.propose(survey)).collect()
+pub fn identified() -> impl Iterator<Item = &'static Cause> {
+    CAUSES.iter().copied().filter(|cause| cause.arm_effect.is_some())
 }

@@ -1,6 +1,6 @@
 //! Changes at one moment: what `zero_shift`, `base_shift` and `tool_shift` have in common.
 
-use super::{Basis, Cause, Form, Hypothesis, Law, Measure, Motion, Place, Survey, Term, Variable, names};
+use super::{Basis, Form, Law, Measure, Motion, Place, Survey, Term, Variable, names};
 
 /// Change points tried at first; the best is refined to every one.
 const CHANGES: usize = 40;
@@ -9,20 +9,19 @@ const CHANGES: usize = 40;
 pub(super) const MEASURE: Measure =
     Measure { rank: 3, advice: "return to a few anchor poses with different first joints every half hour" };
 
-/// Motions at each of the change points. A joint or a tool that steps when the payload changes follows the
-/// payload; what stands before the arm may have been touched then.
-pub(super) fn propose(cause: &'static dyn Cause, motions: &[Motion], survey: &Survey) -> Vec<Hypothesis> {
-    let law = |at| Law::new(Variable::Time, Basis::After { at });
-    let terms = survey.changes(CHANGES).flat_map(|at| motions.iter().map(move |motion| Term::new(cause, *motion, law(at))));
-    let all = terms.filter(|term| is_its_own(term, survey));
-    all.map(|term| Hypothesis::new(term, survey.boundaries.len())).collect()
+/// A motion that steps at each of the change points, with how many are tried. A joint or a tool that steps when the payload changes follows
+/// the payload; what stands before the arm may have been touched then.
+pub(super) fn laws(motion: Motion, survey: &Survey) -> Vec<(Law, usize, f64)> {
+    let times = survey.changes(CHANGES).filter(|at| is_its_own(motion, *at, survey));
+    times.map(|at| (Law::new(Variable::Time, Basis::After { at }), survey.boundaries.len(), 0.0)).collect()
 }
 
 /// The same at neighbouring change points.
 pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
     let Basis::After { at } = term.basis() else { return Vec::new() };
-    let others = survey.changes_near(at).iter().copied().filter(|other| *other != at).map(|at| Basis::After { at });
-    term.with_bases(others).into_iter().filter(|term| is_its_own(term, survey)).collect()
+    let others =
+        survey.changes_near(at).iter().copied().filter(|other| *other != at && is_its_own(term.motion(), *other, survey));
+    term.with_bases(others.map(|at| Basis::After { at }))
 }
 
 /// What may have moved, as far as these data tell, when the payload changed for the only time: of a joint or a tool that follows the payload.
@@ -36,9 +35,8 @@ pub fn moved_with_the_payload(form: &Form, survey: &Survey) -> Option<(&'static 
 }
 
 /// Whether no change of the payload would do the same.
-fn is_its_own(term: &Term, survey: &Survey) -> bool {
-    let by_payload = |at| !matches!(term.motion(), Motion::Base { .. }) && survey.is_payload_change(at);
-    !matches!(term.basis(), Basis::After { at } if by_payload(at))
+fn is_its_own(motion: Motion, at: f64, survey: &Survey) -> bool {
+    matches!(motion, Motion::Base { .. }) || !survey.is_payload_change(at)
 }
 
 #[cfg(test)]
@@ -66,11 +64,8 @@ mod tests {
         let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
         let joint = Motion::Joint { joint: 1 };
         let form = Form::from(Term::new(&Unknown, joint, Law::of(Variable::Payload)));
-        let middle = |hypothesis: &Hypothesis| {
-            let basis = hypothesis.form.term().map(Term::basis);
-            matches!(basis, Some(Basis::After { at }) if (at - 295.0).abs() <= 10.0)
-        };
-        (moved_with_the_payload(&form, &survey), propose(&Unknown, &[joint], &survey).iter().any(middle))
+        let middle = |(law, ..): &(Law, usize, f64)| matches!(law.first.basis, Basis::After { at } if (at - 295.0).abs() <= 10.0);
+        (moved_with_the_payload(&form, &survey), laws(joint, &survey).iter().any(middle))
     }
 
     #[test]

@@ -3,20 +3,23 @@
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
 use super::{
-    ArmState, Cause, DeclaredForm, Deflection, Effect, NumberSpec, ParameterEstimate, ParameterSpec, Place, Survey, Term,
-    Variable, cause,
+    ArmState, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term, Variable, cause,
 };
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
+use crate::units::Unit;
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Name, unit and one sigma of what is known before any measurement (SI), of a coefficient.
+pub type NumberSpec = (String, Unit, f64);
+
 /// What a [`Form`] holds: a law at a place ([`Term`]), one that a user declared ([`DeclaredForm`]), or a motion with physics of its own and
 /// what it changes about the load. It is all that has to be written of such a motion.
 pub trait Placed: Send + Sync {
     /// The cause that proposed it.
-    fn cause(&self) -> &'static dyn Cause;
+    fn cause(&self) -> &'static Cause;
     /// Where it acts.
     fn place(&self) -> Place;
     /// What it depends on.
@@ -25,7 +28,7 @@ pub trait Placed: Send + Sync {
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec>;
     /// See [`Effect::deflect`].
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
-    /// Its place and shape as JSON, as [`CauseDescription::read`](super::CauseDescription::read) reads it: what tells it from others of its cause.
+    /// Its place and shape as JSON, as [`MotionRow::read`](super::MotionRow::read) reads it: what tells it from others of its cause.
     fn body(&self) -> serde_json::Value;
     /// See [`Effect::needs_torque`].
     fn needs_torque(&self) -> bool {
@@ -54,15 +57,12 @@ pub trait Placed: Send + Sync {
     fn variant(&self) -> String {
         String::new()
     }
-    /// What it is called with fitted coefficients `p` (SI): another cause's name where they are that cause's in another form.
-    fn called(&self, _p: &[f64], _survey: &Survey) -> &'static str {
-        self.cause().name()
-    }
-    /// Why coefficients `p` (SI) cannot be its cause's, as a clause: see [`Cause::impossible`].
+    /// Why coefficients `p` (SI) cannot be its cause's, as a clause: a number beyond what physics allows, or beyond what the recording holds.
+    /// Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
     fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
         None
     }
-    /// Other causes that do the same under the name `called`, in whatever data: see [`Cause::identities`].
+    /// Other causes that do the same in a finding of the name `called`, in whatever data: identities of kinematics and statics.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {
         Vec::new()
     }
@@ -70,18 +70,9 @@ pub trait Placed: Send + Sync {
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {
         None
     }
-    /// Which of its parameters are the numbers of a free curve.
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        0..0
-    }
     /// Which of its parameters are of one size: what the rows say of some of them bounds the others.
     fn of_one_size(&self) -> Vec<usize> {
         Vec::new()
-    }
-    /// Parameters, by their numbers, that are held to a size known beforehand (one sigma, SI), so that they carry on no further than that
-    /// where the rows do not determine them.
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        None
     }
     /// The same with its laws held at the ends of what the fitted rows have of their variables; itself where it has none.
     fn held_within(&self, _range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {
@@ -119,7 +110,7 @@ macro_rules! placed {
         fn place(&$me) -> $crate::effect::Place {
             $place
         }
-        fn cause(&$me) -> &'static dyn $crate::effect::Cause {
+        fn cause(&$me) -> &'static $crate::effect::Cause {
             $cause
         }
         fn variables(&$me) -> Vec<$crate::effect::Variable> {
@@ -199,17 +190,12 @@ impl Form {
         format!("{}@{}#{}", self.name(), self.place(), self.variant())
     }
 
-    /// Whether it is of a cause.
-    pub fn is(&self, cause: &dyn Cause) -> bool {
-        self.cause().name() == cause.name()
-    }
-
     /// Whether it belongs to one measurement and not to the arm: it says nothing of another recording, and a command need not
     /// make up for it.
     pub fn is_of_the_measurement(&self) -> bool {
         let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
         let instrument = || self.place() == Place::Tracker;
-        self.cause().about().of_the_measurement || (self.cause().is_nameless() && (passing() || instrument()))
+        self.cause().of_the_measurement || (self.cause().is_nameless() && (passing() || instrument()))
     }
 }
 
@@ -224,7 +210,10 @@ impl<'de> Deserialize<'de> for Form {
         let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
         let [(name, body)] = <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
         let form = match cause(&name) {
-            Some(cause) => cause.about().read.map_or_else(|| Term::read(cause, body.clone()), |read| read(&body)),
+            Some(cause) => match &cause.motion {
+                Some(motion) => (motion.read)(&body),
+                None => Term::read(cause, body),
+            },
             None => DeclaredForm::read(&name, body),
         };
         form.map_err(D::Error::custom)

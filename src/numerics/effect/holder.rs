@@ -2,7 +2,7 @@
 //!
 //! One target on the last body cannot separate a step of the last joint's zero from a displacement of the target about that axis.
 
-use super::{Basis, Clock, FittedForms, Form, ModelledFinding, NamedForms, Place, Survey, Variable, figure, names};
+use super::{Basis, Clock, FittedForms, Form, ModelledFinding, Place, Variable, figure, names};
 use crate::criteria::words::CONSTANT;
 use crate::robot::Travel;
 use nalgebra::Vector3;
@@ -17,17 +17,8 @@ fn stepped(form: &Form, joints: usize) -> Option<f64> {
     }
 }
 
-/// Whether the only target and the zero of the last joint have stepped at the same times.
-pub(super) fn step_together(tool: &NamedForms, zero: &NamedForms, survey: &Survey) -> bool {
-    let times = |of: &NamedForms| of.forms.iter().map(|form| stepped(form, survey.joints())).collect::<Option<Vec<f64>>>();
-    let (Some(moved), Some(stepped)) = (times(tool), times(zero)) else { return false };
-    let alone = survey.rows.iter().all(|row| survey.data.target(*row) == survey.data.target(survey.rows[0]));
-    let at_once = |time: &f64| moved.iter().any(|other| survey.changes_near(*time).contains(other));
-    alone && stepped.iter().all(at_once)
-}
-
 /// A finding that is made of such steps alone, as a turn of the holder.
-pub(super) fn turned(fitted: &FittedForms) -> Option<ModelledFinding> {
+pub fn turned_holder(fitted: &FittedForms) -> Option<ModelledFinding> {
     let FittedForms { robot, data, rows, .. } = *fitted;
     let joints = robot.joints();
     if joints < 2 || !robot.is_revolute(joints - 1) {

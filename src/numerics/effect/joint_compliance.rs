@@ -6,60 +6,55 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, NumberSpec, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable, about, names,
+    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, MotionRow, NumberSpec, ParameterSpec, Place,
+    Placed, Summary, Survey, Variable, names,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
-/// Wind-up of joints by their load.
-pub struct JointCompliance;
+pub(super) static CAUSE: Cause = Cause {
+    name: names::JOINT_COMPLIANCE,
+    place: "joint",
+    formula: "d = c t",
+    size: "0.1 to 10 urad/Nm",
+    confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
+    needs: "link masses, motor currents, or many postures",
+    arm_effect: Some(of_all_joints),
+    motion: Some(MotionRow {
+        propose,
+        sentence: Some(sentence),
+        read: |body| UnweighedWindup::read(&CAUSE, body).unwrap_or_else(|| Form::kept::<Windup>(body)),
+    }),
+    ..Cause::PLAIN
+};
 
-impl Cause for JointCompliance {
-    about! {
-        name: names::JOINT_COMPLIANCE,
-        place: "joint",
-        formula: "d = c t",
-        size: "0.1 to 10 urad/Nm",
-        confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
-        needs: "link masses, motor currents, or many postures",
-        absorbs_residual: &[names::UNKNOWN],
-        arm_effect: Some(|setting| Box::new(Windups(setting.load))),
-        read: Some(|body| UnweighedWindup::read(&JointCompliance, body).unwrap_or_else(|| Form::kept::<Windup>(body))),
-    }
+/// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+    let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup { joint, load: Load::GravityTorque }, 1).positive());
+    let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
+    // The sign of a current is the controller's.
+    let currents = survey.revolute().filter(|_| by_current);
+    let currents = currents.map(|joint| Hypothesis::new(Windup { joint, load: Load::MotorCurrent }, 2));
+    by_gravity.chain(currents).chain(UnweighedWindup::propose(&CAUSE, survey)).collect()
+}
 
-    /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup { joint, load: Load::GravityTorque }, 1).positive());
-        let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
-        // The sign of a current is the controller's.
-        let currents = survey.revolute().filter(|_| by_current);
-        let currents = currents.map(|joint| Hypothesis::new(Windup { joint, load: Load::MotorCurrent }, 2));
-        by_gravity.chain(currents).chain(UnweighedWindup::propose(&Self, survey)).collect()
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        let place = summary.place;
-        let Some(largest) = summary.words(names::JOINT_COMPLIANCE) else {
-            return format!("{place} winds up under its load by {}", summary.value());
-        };
-        let weight = format!("by up to {largest} arcsec where its links stretch out level");
-        // By a stiffness of its own.
-        match summary.wordless(names::JOINT_COMPLIANCE).first() {
-            Some(own) => format!(
-                "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
-                own.value, own.unit
-            ),
-            None => format!(
-                "{place} winds up under gravity, {weight}; its stiffness cannot be separated from the links' weight, which the robot file does \
-                 not give"
-            ),
-        }
-    }
-
-    fn yields_to_torque(&self) -> bool {
-        true
+fn sentence(summary: &Summary) -> String {
+    let place = summary.place;
+    let Some(largest) = summary.words(names::JOINT_COMPLIANCE) else {
+        return format!("{place} winds up under its load by {}", summary.value());
+    };
+    let weight = format!("by up to {largest} arcsec where its links stretch out level");
+    // By a stiffness of its own.
+    match summary.wordless(names::JOINT_COMPLIANCE).first() {
+        Some(own) => format!(
+            "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
+            own.value, own.unit
+        ),
+        None => format!(
+            "{place} winds up under gravity, {weight}; its stiffness cannot be separated from the links' weight, which the robot file does \
+             not give"
+        ),
     }
 }
 
@@ -72,7 +67,7 @@ pub struct Windup {
 }
 
 impl Placed for Windup {
-    placed! { self: Place::Joint(self.joint), &JointCompliance, [Variable::Load { joint: self.joint }], self }
+    placed! { self: Place::Joint(self.joint), &CAUSE, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let prior_sigma = match self.load {
@@ -128,6 +123,10 @@ impl Windup {
 
 /// The wind-ups of every joint that turns.
 struct Windups(Load);
+
+fn of_all_joints(setting: &EffectContext) -> Box<dyn Effect> {
+    Box::new(Windups(setting.load))
+}
 
 impl Windups {
     fn each(&self, robot: &RobotModel) -> impl Iterator<Item = Windup> {

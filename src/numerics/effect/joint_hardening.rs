@@ -1,19 +1,16 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
 use super::form::placed;
-use super::joint_table::PLAUSIBLE;
+use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NamedForms, NumberSpec, ParameterEstimate, Place, Placed, Summary,
-    Survey, Variable, about, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, MotionRow, NumberSpec, ParameterEstimate, Place, Placed, Summary,
+    Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
-
-/// Wind-up that is not in proportion to the load.
-pub struct JointHardening;
 
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,8 +34,6 @@ pub struct BentWindup {
     law: HardeningLaw,
 }
 
-/// What a wind-up lacks in proportion at its bend, rad (one sigma): 200 arcsec.
-const LARGE: f64 = 1e-3;
 /// Sines of a free curve.
 const CURVE: usize = 6;
 /// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
@@ -46,67 +41,43 @@ const CURVE: usize = 6;
 const BENDS: [f64; 2] = [0.01, 0.98];
 /// Share of the rows that has to lie on the other side of a bend.
 const BEYOND: f64 = 0.05;
-/// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
-const SHARP: f64 = 0.15;
-const FLAT: f64 = 0.1;
+pub(super) static CAUSE: Cause = Cause {
+    name: names::JOINT_HARDENING,
+    place: "joint",
+    formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
+    size: "5 to 50 % of the wind-up",
+    confounded: "joint_compliance, backlash",
+    needs: "link masses and two payloads",
+    measure: Some(Measure {
+        rank: 7,
+        advice: "measure with a third payload between none and full, and with joints near their largest load",
+    }),
+    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<BentWindup> }),
+    ..Cause::PLAIN
+};
 
-impl Cause for JointHardening {
-    about! {
-        name: names::JOINT_HARDENING,
-        place: "joint",
-        formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
-        size: "5 to 50 % of the wind-up",
-        confounded: "joint_compliance, backlash",
-        needs: "link masses and two payloads",
-        measure: Some(Measure {
-            rank: 7,
-            advice: "measure with a third payload between none and full, and with joints near their largest load",
-        }),
-        absorbs_residual: &[names::BACKLASH, names::UNKNOWN],
-        read: Some(Form::kept::<BentWindup>),
+/// Every loaded joint with several laws each.
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let mut out = Vec::new();
+    for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
+        let most = survey.load(joint);
+        let least = least_bend(survey, joint);
+        let seen = move |share: &f64| share * most >= least;
+        let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
+        let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
+        let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
+        let laws = laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
+        let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
+        out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
+        let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
+        out.push(Hypothesis::new(curve, 1).penalised(*RARE));
     }
+    out
+}
 
-    /// Every loaded joint with several laws each.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let mut out = Vec::new();
-        for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
-            let most = survey.load(joint);
-            let least = least_bend(survey, joint);
-            let seen = move |share: &f64| share * most >= least;
-            let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
-            let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
-            let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
-            let laws =
-                laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
-            let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, *effect::BENDS).penalised(*RARE)));
-            let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
-            out.push(Hypothesis::new(curve, 1).penalised(*RARE));
-        }
-        out
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
-        format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
-    }
-
-    /// A joint has one wind-up.
-    fn has_part(&self, own: &NamedForms, part: &NamedForms, _survey: &Survey) -> bool {
-        own.name == self.name() && (part.name, part.place) == (names::JOINT_COMPLIANCE, own.place)
-    }
-
-    fn simpler(&self) -> Option<&'static str> {
-        Some(names::JOINT_COMPLIANCE)
-    }
-
-    fn yields_to_torque(&self) -> bool {
-        true
-    }
-
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        true
-    }
+fn sentence(summary: &Summary) -> String {
+    let shape = summary.words(names::JOINT_HARDENING).unwrap_or_else(|| "its shape is a free curve of the load".into());
+    format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
 }
 
 /// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;
@@ -125,18 +96,6 @@ fn least_bend(survey: &Survey, joint: usize) -> f64 {
 }
 
 impl BentWindup {
-    /// Whether coefficients `p` make a wind-up that does not grow with the load beyond a small one: lost motion to the side of the
-    /// load. `most` is the largest torque, Nm.
-    fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
-        match (self.law, p) {
-            (
-                HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm },
-                [linear, bend],
-            ) => at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs(),
-            _ => false,
-        }
-    }
-
     /// f and its slope.
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
@@ -159,7 +118,7 @@ impl BentWindup {
 }
 
 impl Placed for BentWindup {
-    placed! { self: Place::Joint(self.joint), &JointHardening, [Variable::Load { joint: self.joint }], self }
+    placed! { self: Place::Joint(self.joint), &CAUSE, [Variable::Load { joint: self.joint }], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mut numbers = vec![("linear".into(), Unit::RadianPerNewtonMetre, 1e-3)];
@@ -203,24 +162,6 @@ impl Placed for BentWindup {
         Some((self.joint, *p.first()?))
     }
 
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        if let HardeningLaw::Curve { .. } = self.law { 1..1 + CURVE } else { 0..0 }
-    }
-
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        match self.law {
-            HardeningLaw::Saturating { at_nm }
-            | HardeningLaw::SoftZone { at_nm }
-            | HardeningLaw::Knee { at_nm }
-            | HardeningLaw::Power { at_nm, .. } => Some((1..2, LARGE / at_nm)),
-            HardeningLaw::Curve { .. } => None,
-        }
-    }
-
-    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        if self.is_lost_motion(p, survey.load(self.joint)) { names::BACKLASH } else { names::JOINT_HARDENING }
-    }
-
     fn impossible(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = self.law
         else {
@@ -229,10 +170,6 @@ impl Placed for BentWindup {
         let most = survey.recorded_load(self.joint);
         let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
         (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
-    }
-
-    fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
-        if called == names::BACKLASH { vec![(names::JOINT_HARDENING, self.place())] } else { Vec::new() }
     }
 
     fn words(&self, _numbers: &[&ParameterEstimate]) -> Option<String> {

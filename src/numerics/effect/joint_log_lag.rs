@@ -3,16 +3,13 @@
 
 use super::form::placed;
 use super::{
-    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NamedForms, NumberSpec, Place, Placed, Summary, Survey, Variable,
-    about, figure, names,
+    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, MotionRow, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    figure, names,
 };
-use crate::criteria::words::{CLOCKS, TRACE};
+use crate::criteria::words::CLOCKS;
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
-
-/// Joints logged before or after the point was measured.
-pub struct JointLogLag;
 
 /// What the lag is in proportion to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,75 +35,65 @@ pub struct Lag {
 /// s: clocks farther apart belong to other postures altogether.
 const LARGEST: f64 = 0.3;
 
-impl Cause for JointLogLag {
-    about! {
-        name: names::JOINT_LOG_LAG,
-        place: "recording",
-        formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
-        size: "0.1 to 5 % of the move; 0.5 to 20 ms",
-        confounded: "backlash; viscous_windup where one joint moves alone",
-        needs: "rows in the order of measurement; joint velocities",
-        of_the_measurement: true,
-        separable_by_poses: false,
-        read: Some(Form::kept::<Lag>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::JOINT_LOG_LAG,
+    place: "recording",
+    formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
+    size: "0.1 to 5 % of the move; 0.5 to 20 ms",
+    confounded: "backlash; viscous_windup where one joint moves alone",
+    needs: "rows in the order of measurement; joint velocities",
+    hidden: Some(|| HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond }),
+    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<Lag> }),
+    of_the_measurement: true,
+    separable_by_poses: false,
+    ..Cause::PLAIN
+};
 
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        if survey.moves() {
-            // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
-            return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock }, 1).within(LARGEST)];
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    if survey.moves() {
+        // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
+        return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock }, 1).within(LARGEST)];
+    }
+    let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)];
+    laws.map(|(each, by)| Hypothesis::new(Lag { each, by }, laws.len())).to_vec()
+}
+
+fn sentence(summary: &Summary) -> String {
+    let clocks = summary.variables(names::JOINT_LOG_LAG).contains(&Variable::Speed);
+    match summary.parameters.first() {
+        Some(n) if clocks => {
+            let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
+            let ms = figure(n.value.abs(), 2);
+            format!(
+                "the tracker's clock is {ms} ms {how} relative to the controller's: points were measured that long {when} the joints \
+                 of their rows"
+            )
         }
-        let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)];
-        laws.map(|(each, by)| Hypothesis::new(Lag { each, by }, laws.len())).to_vec()
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        let clocks = summary.variables(names::JOINT_LOG_LAG).contains(&Variable::Speed);
-        match summary.parameters.first() {
-            Some(n) if clocks => {
-                let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
-                let ms = figure(n.value.abs(), 2);
-                format!(
-                    "the tracker's clock is {ms} ms {how} relative to the controller's: points were measured that long {when} the joints \
-                     of their rows"
-                )
-            }
-            // A turn that is shared out, not shares of each turn.
-            Some(n) if n.unit == "arcsec" => format!(
-                "joints were logged before the arm had settled: the joint that moved most had {} arcsec still to come, the others their \
-                 shares of it",
-                figure(n.value, 0)
-            ),
-            Some(n) if summary.parameters.len() == 1 => format!(
-                "joints were logged before the arm had settled: {} % of the last move was still to come",
-                figure(n.value * 100.0, 2)
-            ),
-            Some(_) => {
-                let shares = summary.parameters.iter().map(|n| n.value * 100.0);
-                let most = shares.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
-                format!(
-                    "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
-                     still to come",
-                    figure(most, 3)
-                )
-            }
-            None => "joints and points do not belong to the same moment".to_string(),
+        // A turn that is shared out, not shares of each turn.
+        Some(n) if n.unit == "arcsec" => format!(
+            "joints were logged before the arm had settled: the joint that moved most had {} arcsec still to come, the others their \
+             shares of it",
+            figure(n.value, 0)
+        ),
+        Some(n) if summary.parameters.len() == 1 => format!(
+            "joints were logged before the arm had settled: {} % of the last move was still to come",
+            figure(n.value * 100.0, 2)
+        ),
+        Some(_) => {
+            let shares = summary.parameters.iter().map(|n| n.value * 100.0);
+            let most = shares.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+            format!(
+                "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
+                 still to come",
+                figure(most, 3)
+            )
         }
-    }
-
-    /// A backlash follows the side of the last move, too.
-    fn absorbs_below(&self, _own: &NamedForms, part: &NamedForms) -> Option<f64> {
-        (part.name == names::BACKLASH).then_some(*TRACE)
-    }
-
-    fn hidden(&self, form: &Form, _robot: &RobotModel) -> Option<HiddenSize> {
-        let clocks = form.variables() == [Variable::Speed];
-        clocks.then_some(HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond })
+        None => "joints and points do not belong to the same moment".to_string(),
     }
 }
 
 impl Placed for Lag {
-    placed! { self: Place::Recording, &JointLogLag, [if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }], self }
+    placed! { self: Place::Recording, &CAUSE, [if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }], self }
 
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
         match (self.by, self.each) {

@@ -2,16 +2,13 @@
 
 use super::form::placed;
 use super::motion::{SHORT, extent};
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::{RARE, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-/// Links that bend under the moment at their far joint.
-pub struct LinkCompliance;
 
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -35,42 +32,34 @@ pub struct BentLink {
 /// The last links are a stubby wrist, and hardly bend.
 const WRIST: usize = 2;
 
-impl Cause for LinkCompliance {
-    about! {
-        name: names::LINK_COMPLIANCE,
-        place: "link",
-        formula: "the link bends about its far joint, by the moment there",
-        size: "0.05 to 1 urad/Nm",
-        confounded: "joint_compliance of either end",
-        needs: "link masses",
-        read: Some(Form::kept::<BentLink>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::LINK_COMPLIANCE,
+    place: "link",
+    formula: "the link bends about its far joint, by the moment there",
+    size: "0.05 to 1 urad/Nm",
+    confounded: "joint_compliance of either end",
+    needs: "link masses",
+    sentence: "{place} bends under what it carries by {value}",
+    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<BentLink> }),
+    ..Cause::PLAIN
+};
 
-    /// Every link that something hangs on.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let n = survey.joints();
-        let loaded = (0..n).any(|joint| survey.is_loaded(joint));
-        let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
-        let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
-        let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
-        let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };
-        forms
-            .map(|form| (odds(&form), form))
-            .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
-            .collect()
-    }
-
-    fn stands_in_for_two(&self) -> bool {
-        true
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        format!("{} bends under what it carries by {}", summary.place, summary.value())
-    }
+/// Every link that something hangs on.
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let n = survey.joints();
+    let loaded = (0..n).any(|joint| survey.is_loaded(joint));
+    let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
+    let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
+    let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
+    let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };
+    forms
+        .map(|form| (odds(&form), form))
+        .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
+        .collect()
 }
 
 impl Placed for BentLink {
-    placed! { self: Place::Links(self.link, self.link), &LinkCompliance, [Variable::ArmLoad], self }
+    placed! { self: Place::Links(self.link, self.link), &CAUSE, [Variable::ArmLoad], self }
 
     /// What carries the first joint's link is the base.
     fn identities(&self, _called: &str) -> Vec<(&'static str, Place)> {

@@ -2,14 +2,12 @@
 
 use super::form::placed;
 use super::spring::{MEASURE, Spring};
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-pub struct LinkMass;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct WrongLinkMass {
@@ -19,39 +17,31 @@ pub struct WrongLinkMass {
     centre: bool,
 }
 
-impl Cause for LinkMass {
-    about! {
-        name: names::LINK_MASS,
-        place: "link",
-        formula: "mass and first moments of a link in the torque model",
-        size: "3 to 20 %",
-        confounded: "counterbalance, payload_error",
-        needs: "link masses and motor currents",
-        measure: Some(MEASURE),
-        read: Some(Form::kept::<WrongLinkMass>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::LINK_MASS,
+    place: "link",
+    formula: "mass and first moments of a link in the torque model",
+    size: "3 to 20 %",
+    confounded: "counterbalance, payload_error",
+    needs: "link masses and motor currents",
+    sentence: "the mass or centre of {place} in the torque model is wrong",
+    measure: Some(MEASURE),
+    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<WrongLinkMass> }),
+    ..Cause::PLAIN
+};
 
-    /// Every link carried by a joint that yields in the present model.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let carried = |link: &usize| (0..=*link).any(|joint| survey.compliance[joint] > 0.0);
-        let body = |link: &usize| &survey.robot.description().joints[*link];
-        let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
-        let links = (1..survey.joints()).filter(carried).filter(known);
-        let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-        forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
-    }
-
-    fn takes_up_loads(&self, _form: &Form) -> bool {
-        true
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        format!("the mass or centre of {} in the torque model is wrong", summary.place)
-    }
+/// Every link carried by a joint that yields in the present model.
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let carried = |link: &usize| (0..=*link).any(|joint| survey.compliance[joint] > 0.0);
+    let body = |link: &usize| &survey.robot.description().joints[*link];
+    let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
+    let links = (1..survey.joints()).filter(carried).filter(known);
+    let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
+    forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
 }
 
 impl Placed for WrongLinkMass {
-    placed! { self: Place::Links(self.link, self.link), &LinkMass, [Variable::ArmLoad], self }
+    placed! { self: Place::Links(self.link, self.link), &CAUSE, [Variable::ArmLoad], self }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
         let mass = ("mass".into(), Unit::Kilogram, 1e4);

@@ -1,19 +1,8 @@
-//! Which findings are parts of others: what a cause says of forms that are called one name at one place.
+//! What a finding is in the fitted model, and how large a cause may be that is not found.
 
 use super::{EffectStack, Form, Place};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
-
-/// Forms that are called one cause at one place.
-#[derive(Debug, Clone)]
-pub struct NamedForms<'a> {
-    /// What they are called: see [`super::Placed::called`].
-    pub name: &'static str,
-    /// Where they act.
-    pub place: Place,
-    /// Each of them.
-    pub forms: Vec<&'a Form>,
-}
 
 /// A finding in the fitted model.
 #[derive(Clone, Copy)]

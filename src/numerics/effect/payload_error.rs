@@ -3,15 +3,13 @@
 use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-pub struct PayloadError;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct WrongPayload {
@@ -25,48 +23,47 @@ pub struct WrongPayload {
 /// A tool of which nothing is known weighs this much, kg (one sigma), or as much as the heaviest declared payload.
 const TOOL: f64 = 5.0;
 
-impl Cause for PayloadError {
-    about! {
-        name: names::PAYLOAD_ERROR,
-        place: "tool",
-        formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
-        size: "3 to 30 %",
-        confounded: "joint_hardening",
-        needs: "rows with and without the payload",
-        measure: Some(MEASURE),
-        read: Some(Form::kept::<WrongPayload>),
-    }
+pub(super) static CAUSE: Cause = Cause {
+    name: names::PAYLOAD_ERROR,
+    place: "tool",
+    formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
+    size: "3 to 30 %",
+    confounded: "joint_hardening",
+    needs: "rows with and without the payload",
+    measure: Some(MEASURE),
+    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<WrongPayload> }),
+    ..Cause::PLAIN
+};
 
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
-        let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
-        let mut out: Vec<Hypothesis> = forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
-        // Without any mass of the links nothing says how much of a wind-up is the tool's.
-        let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
-        if yields && weighs {
-            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(*RARE));
-        }
-        out
+fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
+    let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
+    let mut out: Vec<Hypothesis> = forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
+    // Without any mass of the links nothing says how much of a wind-up is the tool's.
+    let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
+    if yields && weighs {
+        out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(*RARE));
     }
+    out
+}
 
-    fn sentence(&self, summary: &Summary) -> String {
-        match summary.parameters.first() {
-            // A tool's mass is its only form that loads an arm without a payload.
-            Some(n) if summary.variables(self.name()).contains(&Variable::ArmLoad) => {
-                let how = if n.value < 0.0 { "less" } else { "more" };
-                format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
-            }
-            Some(n) => {
-                let how = if n.value < 0.0 { "lighter" } else { "heavier" };
-                format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
-            }
-            None => "the payload is not what was declared".to_string(),
+fn sentence(summary: &Summary) -> String {
+    match summary.parameters.first() {
+        // A tool's mass is its only form that loads an arm without a payload.
+        Some(n) if summary.variables(names::PAYLOAD_ERROR).contains(&Variable::ArmLoad) => {
+            let how = if n.value < 0.0 { "less" } else { "more" };
+            format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
         }
+        Some(n) => {
+            let how = if n.value < 0.0 { "lighter" } else { "heavier" };
+            format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
+        }
+        None => "the payload is not what was declared".to_string(),
     }
 }
 
 impl Placed for WrongPayload {
-    placed! { self: Place::Tool, &PayloadError, [if self.tool { Variable::ArmLoad } else { Variable::Payload }], self }
+    placed! { self: Place::Tool, &CAUSE, [if self.tool { Variable::ArmLoad } else { Variable::Payload }], self }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {

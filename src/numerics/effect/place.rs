@@ -28,15 +28,6 @@ pub enum Place {
 }
 
 impl Place {
-    /// How many places of this kind an arm has.
-    pub fn count(&self, joints: usize) -> usize {
-        match self {
-            Self::Joint(_) | Self::Coupled(..) => joints,
-            Self::Links(..) => joints.saturating_sub(1).max(1),
-            _ => 1,
-        }
-    }
-
     /// As it stands in parameter names: `j3`, `j4_j5`, `l2`, `l2_4`, `base`.
     pub fn tag(&self) -> String {
         match self {

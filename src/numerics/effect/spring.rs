@@ -5,7 +5,11 @@
 //! or is slack.
 
 use super::form::placed;
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, Place, Placed, Survey, Variable, names};
+use super::unknown::described;
+use super::{
+    ArmState, Cause, Deflection, Form, Hypothesis, Measure, MotionRow, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    names,
+};
 use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -17,13 +21,56 @@ pub(super) const MEASURE: Measure = Measure {
     advice: "log motor currents at rest, or measure with two payloads over the joint's full range (for a balancer also disconnected)",
 };
 
-/// What its own shape may leave at the same joint.
-pub(super) const FINER: &[&str] = &[names::GEAR_CYCLIC, names::UNKNOWN, names::JOINT_TABLE, names::BACKLASH];
+/// A balancer: it sits on joint 2 or 3; a torque by the angle of any other joint is that of a hose or cable.
+pub(super) static BALANCER: Cause = Cause {
+    name: names::COUNTERBALANCE,
+    place: "joint 2 or 3",
+    formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
+    size: "10 to 60 % of the gravity torque",
+    confounded: "gear_cyclic of order 1, link_mass",
+    needs: "link masses and motor currents",
+    sentence: "a balancer (spring or gas) acts on {place} and is missing from the torque model",
+    measure: Some(MEASURE),
+    motion: Some(MotionRow {
+        propose: |survey| Spring::propose(&BALANCER, survey, Spring::balances),
+        sentence: None,
+        read: |body| Spring::read(&BALANCER, body),
+    }),
+    ..Cause::PLAIN
+};
+
+/// A hose package pulls on a joint by its angle, as a spring does; or by its own angle and its neighbour's, as a law without a name that is
+/// called so.
+pub(super) static HOSE: Cause = Cause {
+    name: names::CABLE_DRAG,
+    place: "joint",
+    formula: "t by the angles of the joint and its neighbour",
+    size: "1 to 10 % of the joint's torque",
+    confounded: "unknown, gear_cyclic of order 1",
+    needs: "motor currents",
+    measure: Some(MEASURE),
+    motion: Some(MotionRow {
+        propose: |survey| Spring::propose(&HOSE, survey, |joint| !Spring::balances(joint)),
+        sentence: Some(pulled),
+        read: |body| Spring::read(&HOSE, body),
+    }),
+    ..Cause::PLAIN
+};
+
+fn pulled(summary: &Summary) -> String {
+    let place = summary.place;
+    match described(summary) {
+        Some(law) => format!("something pulls on {place} as a hose package does: {law}"),
+        None => {
+            format!("a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model")
+        }
+    }
+}
 
 /// Under the name of a cause.
 #[derive(Clone)]
 pub(super) struct Spring {
-    cause: &'static dyn Cause,
+    cause: &'static Cause,
     shape: SpringShape,
 }
 
@@ -43,7 +90,7 @@ const ORDERS: u32 = 2;
 
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
-    pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
+    pub fn propose(cause: &'static Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs =
             joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
@@ -56,7 +103,7 @@ impl Spring {
     }
 
     /// Reads the body of a form.
-    pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> serde_json::Result<Form> {
+    pub fn read(cause: &'static Cause, body: &serde_json::Value) -> serde_json::Result<Form> {
         Ok(Self { cause, shape: SpringShape::deserialize(body)? }.into())
     }
 

@@ -48,7 +48,7 @@ pub struct Summary<'a> {
 
 impl<'a> Summary<'a> {
     /// The cause of a name: of one of the forms, or of the library.
-    pub fn cause(&self, name: &str) -> Option<&'static dyn Cause> {
+    pub fn cause(&self, name: &str) -> Option<&'static Cause> {
         self.forms.iter().map(|form| form.cause()).find(|own| own.name() == name).or_else(|| cause(name))
     }
 
@@ -92,22 +92,5 @@ impl<'a> Summary<'a> {
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
         self.parameters.first().map_or_else(String::new, |n| format!("{}{}", figure(n.value.abs(), 0), unit(n)))
-    }
-
-    /// When the first term of a cause changes, if it does.
-    pub(super) fn when(&self, name: &'static str) -> String {
-        let change = self.terms(name).find_map(|term| match (term.law().first.of, term.basis()) {
-            (Variable::Time, super::Basis::After { at }) => Some(at),
-            _ => None,
-        });
-        change.map_or_else(String::new, |time| self.clock.since(time))
-    }
-}
-
-/// The amplitude of a sine and a cosine, the first two of some numbers.
-pub(super) fn amplitude(numbers: &[&ParameterEstimate]) -> String {
-    match numbers {
-        [a, b, ..] => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
-        _ => String::new(),
     }
 }

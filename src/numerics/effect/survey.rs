@@ -1,6 +1,6 @@
 //! What a recording offers to hypotheses: ranges, loads, times, and which columns it has.
 
-use super::{Form, Sight};
+use super::Form;
 use crate::robot::{Measurements, Posture, RobotModel};
 use nalgebra::Vector3;
 
@@ -142,15 +142,6 @@ impl<'a> Survey<'a> {
         count > 0 && points().all(|point| (point - middle).norm() < middle.norm())
     }
 
-    /// Lowest and highest elevation (rad) and range (m) of the points.
-    pub fn seen(&self) -> [[f64; 2]; 2] {
-        let points = self.rows.iter().filter_map(|row| self.data.point(*row)).map(|point| Sight::of(&point));
-        points.fold([[f64::INFINITY, f64::NEG_INFINITY]; 2], |[elevations, ranges], sight| {
-            let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
-            [wider(elevations, sight.elevation), wider(ranges, sight.range)]
-        })
-    }
-
     /// Whether some but not all rows carry (more than half of the largest) payload.
     pub fn payload_changes(&self) -> bool {
         let heavy = self.heavy_payload();
@@ -197,21 +188,12 @@ pub struct Hypothesis {
     pub positive: bool,
     /// The largest coefficient that makes sense, SI.
     pub largest: f64,
-    /// A product of a named law, which stands only beside that law.
-    pub inherits: bool,
 }
 
 impl Hypothesis {
     /// A hypothesis of `tried` like ones.
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self {
-            form: form.into(),
-            tried: tried.max(1) as f64,
-            prior_penalty: 0.0,
-            positive: false,
-            largest: f64::INFINITY,
-            inherits: false,
-        }
+        Self { form: form.into(), tried: tried.max(1) as f64, prior_penalty: 0.0, positive: false, largest: f64::INFINITY }
     }
 
     /// With coefficients that must be positive.
@@ -222,11 +204,6 @@ impl Hypothesis {
     /// With coefficients up to `largest`, SI.
     pub fn within(self, largest: f64) -> Self {
         Self { largest, ..self }
-    }
-
-    /// A product of a named law, which stands only beside that law.
-    pub fn inheriting(self) -> Self {
-        Self { inherits: true, ..self }
     }
 
     /// Less likely beside the other shapes of its cell, -2 ln of the odds.

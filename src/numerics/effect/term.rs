@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A law at a place, under the name of a cause.
 #[derive(Clone)]
 pub struct Term {
-    cause: &'static dyn Cause,
+    cause: &'static Cause,
     motion: Motion,
     law: Law,
 }
@@ -23,12 +23,12 @@ struct Stored {
 
 impl Term {
     /// A law of a motion, under the name of a cause.
-    pub fn new(cause: &'static dyn Cause, motion: Motion, law: Law) -> Self {
-        Self { cause, motion, law }
+    pub fn new(cause: impl Into<&'static Cause>, motion: Motion, law: Law) -> Self {
+        Self { cause: cause.into(), motion, law }
     }
 
     /// Reads what [`Form::body`] made of a term.
-    pub(super) fn read(cause: &'static dyn Cause, body: serde_json::Value) -> serde_json::Result<Form> {
+    pub(super) fn read(cause: &'static Cause, body: serde_json::Value) -> serde_json::Result<Form> {
         let Stored { motion, law } = serde_json::from_value(body)?;
         Ok(Self { cause, motion, law }.into())
     }
@@ -88,7 +88,7 @@ impl PartialEq for Term {
 }
 
 impl Placed for Term {
-    fn cause(&self) -> &'static dyn Cause {
+    fn cause(&self) -> &'static Cause {
         self.cause
     }
 
@@ -131,12 +131,8 @@ impl Placed for Term {
         self.cause.variant(self)
     }
 
-    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
-        self.cause.called(self, p, survey)
-    }
-
     fn impossible(&self, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
-        self.cause.impossible(self, p, error, survey)
+        self.cause.law(self)?.impossible(self, p, error, survey)
     }
 
     fn identities(&self, called: &str) -> Vec<(&'static str, Place)> {
@@ -151,14 +147,6 @@ impl Placed for Term {
         let held = |factor: Factor| range(factor.of).map_or(factor, |range| factor.held_within(range));
         let law = Law { first: held(self.law.first), times: self.law.times.map(held) };
         Some(self.with(law).into())
-    }
-
-    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
-        Some((0..self.law.count(), self.cause.prior_sigma(self)?))
-    }
-
-    fn free_curve(&self) -> std::ops::Range<usize> {
-        if self.is_own_curve() { 0..self.law.count() } else { 0..0 }
     }
 
     fn body(&self) -> serde_json::Value {

@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about where it is mounted.
 
-use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, about, names};
+use super::{ArmState, Deflection, Effect, ParameterSpec, Place, names};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -23,18 +23,6 @@ impl ToolOffset {
     /// What the names of a target's parameters begin with, dot included.
     pub fn prefix(target: &str) -> String {
         if target.is_empty() { format!("{}.", names::TOOL_OFFSET) } else { format!("{}.{target}.", names::TOOL_OFFSET) }
-    }
-}
-
-impl Cause for ToolOffset {
-    about! {
-        name: names::TOOL_OFFSET,
-        place: "tool",
-        formula: "a displacement of the measured point",
-        size: "any",
-        confounded: "link_geometry of the last link",
-        needs: "-",
-        arm_effect: Some(|_| Box::new(ToolOffset)),
     }
 }
 

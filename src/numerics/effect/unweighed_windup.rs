@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Under the name of a cause.
 #[derive(Clone)]
 pub(super) struct UnweighedWindup {
-    cause: &'static dyn Cause,
+    cause: &'static Cause,
     shape: WindupShape,
 }
 
@@ -48,8 +48,6 @@ const LEVER: f64 = 0.05;
 const SLIGHT: f64 = 0.1;
 /// The forms of one joint: bodies with and without moments across their lines.
 const FORMS: usize = 3;
-/// A wheel off its centre errs with any phase; within this tangent of the phase of a weight it is a weight.
-const PHASE: f64 = 1.5;
 /// rad; one sigma of what is known.
 const WIDE: f64 = 0.01;
 /// rad, under the weight of one body at full stretch; the softest joints (20,000 Nm/rad under 200 Nm) yield as much.
@@ -58,7 +56,7 @@ const LARGEST: f64 = 0.01;
 impl UnweighedWindup {
     /// Proposes wind-ups of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file
     /// gives no mass.
-    pub fn propose(cause: &'static dyn Cause, survey: &Survey) -> Vec<Hypothesis> {
+    pub fn propose(cause: &'static Cause, survey: &Survey) -> Vec<Hypothesis> {
         if !is_unweighed(survey.robot) {
             return Vec::new();
         }
@@ -69,7 +67,7 @@ impl UnweighedWindup {
         loaded.flat_map(|joint| Self::at(cause, survey.robot, joint, &lines)).collect()
     }
 
-    fn at(cause: &'static dyn Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
+    fn at(cause: &'static Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
         let most = lines[joint..].iter().map(|line| line.norm()).fold(0.0, f64::max);
         let bodies: Vec<usize> = (joint..robot.joints()).filter(|body| robot.is_revolute(*body)).collect();
         let heavy: Vec<usize> = bodies.iter().copied().filter(|body| lines[*body].norm() > SLIGHT * most).collect();
@@ -101,7 +99,7 @@ impl UnweighedWindup {
     }
 
     /// Reads the body of a form, where it is one of these.
-    pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+    pub fn read(cause: &'static Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         body.get("moments")?;
         Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
     }
@@ -199,21 +197,6 @@ impl Placed for UnweighedWindup {
 
     fn variant(&self) -> String {
         "gravity".into()
-    }
-
-    /// Weights hang outwards: what acts the other way is something else by the same angles.
-    fn called(&self, p: &[f64], _survey: &Survey) -> &'static str {
-        let sum = |outwards: bool| {
-            let own = self.shape.moments.iter().zip(p).filter(|(moment, _)| moment.outwards == outwards);
-            own.map(|(_, value)| if outwards { *value } else { value.abs() }).sum::<f64>()
-        };
-        let (outwards, across) = (sum(true), sum(false));
-        let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
-        match self.shape.own_angle {
-            true if has(false) && across > PHASE * outwards => names::GEAR_CYCLIC,
-            _ if has(true) && outwards < 0.0 => names::CABLE_DRAG,
-            _ => self.cause.name(),
-        }
     }
 
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.

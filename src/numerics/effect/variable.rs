@@ -173,11 +173,6 @@ impl Variable {
         matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })
     }
 
-    /// Whether it drifts with the recording, so that other rows than the recorded ones come after all that was seen of it.
-    pub fn wanders(self) -> bool {
-        matches!(self, Self::Time | Self::Temperature | Self::Lagging { .. })
-    }
-
     /// Whether no target states it: it follows from the moves before, or is a circumstance that targets have no column for.
     pub fn is_no_targets(self) -> bool {
         let by_moves = matches!(self, Self::Move { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::Work { .. });

@@ -107,8 +107,6 @@ impl DiagnosisSummary {
         if let Some(statement) = self.verdict.statement.as_ref().filter(|_| self.is_wrong_setup() && self.findings.0.is_empty()) {
             text.push_str(&screen::sentence("", statement, width));
         }
-        let withdrawn = self.said(VerdictTopic::Withdrawn).len();
-        text.push_str(&screen::withdrawn(withdrawn));
         let aside: Vec<String> =
             self.worst_aside().iter().map(|row| format!("{} ({})", row.point_id, length(row.size_mm))).collect();
         text.push_str(&screen::names("set aside", &aside, width));

@@ -190,7 +190,6 @@ impl DiagnosisSummary {
             "clock": v.clock,
             "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
             "findings": findings.collect::<Vec<_>>(),
-            "withdrawn": self.said(VerdictTopic::Withdrawn),
             "not_observable": self.said(VerdictTopic::NotObservable),
             "leftover": {
                 "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
@@ -276,9 +275,6 @@ impl DiagnosisSummary {
             if !rivals.is_empty() {
                 text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }
-        }
-        for line in self.said(VerdictTopic::Withdrawn) {
-            text.push_str(&format!("withdrawn: {line}\n"));
         }
         for line in self.said(VerdictTopic::NotObservable) {
             text.push_str(&format!("not observable: {line}\n"));

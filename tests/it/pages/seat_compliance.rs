@@ -1,45 +1,23 @@
-use calib::effect::{Axes, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, about};
-use calib::robot::RobotModel;
-use calib::units::Unit;
+use calib::effect::{At, Cause, Follows, LawRow};
 
 /// The seat of the tool yields in proportion to the payload.
-pub struct SeatCompliance;
-
-impl Cause for SeatCompliance {
-    about! {
-        name: "seat_compliance",
-        place: "tool",
-        formula: "the target moves by c times the payload over the largest payload",
-        size: "10 to 200 um",
-        confounded: "payload_error, joint_compliance of the last joints",
-        needs: "rows with and without the payload",
-    }
-
-    /// One hypothesis, where the recording can tell.
-    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        if !survey.payload_changes() {
-            return Vec::new();
-        }
-        let law = Law::new(Variable::Payload, Basis::Linear { zero: 0.0, per: 2.0 * survey.heavy_payload() });
-        vec![Hypothesis::new(Term::new(&Self, Motion::Tool { axes: Axes::Place }, law), 1)]
-    }
-
-    /// Its three numbers: name, unit for people, and how large they may be (SI).
-    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["x", "y", "z"].map(|axis| (axis.to_string(), Unit::Millimetre, 1e-3)).into()
-    }
-
-    fn sentence(&self, summary: &Summary) -> String {
-        let square = summary.parameters.iter().map(|number| number.value.powi(2)).sum::<f64>();
-        format!("the seat of the tool yields by {:.3} mm under the largest payload", square.sqrt())
-    }
-}
+pub static SEAT_COMPLIANCE: Cause = Cause {
+    name: "seat_compliance",
+    place: "tool",
+    formula: "the target moves by c times the payload over the largest payload",
+    size: "10 to 200 um",
+    confounded: "payload_error, joint_compliance of the last joints",
+    needs: "rows with and without the payload",
+    sentence: "the seat of the tool yields by {length} under the largest payload",
+    laws: &[LawRow { at: At::Tool, follows: Follows::Payload, ..LawRow::PLAIN }],
+    ..Cause::PLAIN
+};
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixture;
-    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, arm_effect};
+    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, Summary, Survey, arm_effect};
     use calib::estimate::{FitOptions, Model, fit};
     use calib::robot::{Measurements, PointReadings};
     use calib::spatial::{Pose, Twist};
@@ -62,7 +40,7 @@ mod tests {
         let (torque, compliance) = (vec![0.0; rows.len() * robot.joints()], vec![0.0; robot.joints()]);
         let form: Form = {
             let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
-            let [hypothesis] = SeatCompliance.propose(&survey).try_into().expect("one");
+            let [hypothesis] = SEAT_COMPLIANCE.propose(&survey).try_into().expect("one");
             hypothesis.form
         };
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.1, 2.0));
@@ -88,6 +66,6 @@ mod tests {
         let parameters: Vec<ParameterEstimate> = fitted.x[first..].iter().enumerate().map(number).collect();
         let forms = [form];
         let summary = Summary { place: forms[0].place(), forms: &forms, parameters: &parameters, clock: Clock::Rows };
-        assert_eq!(SeatCompliance.sentence(&summary), "the seat of the tool yields by 0.126 mm under the largest payload");
+        assert_eq!(SEAT_COMPLIANCE.sentence(&summary), "the seat of the tool yields by 0.126 mm under the largest payload");
     }
 }

@@ -170,8 +170,7 @@ fn verdict() -> Verdict {
 
 fn sentences() -> VerdictSentences {
     let unseen = ["temperature: none was recorded", "tracker_scale: <measure> a scale bar"].map(String::from);
-    let withdrawn = ["payload_error at tool: <smaller> than its own uncertainty".to_string()];
-    VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen), (VerdictTopic::Withdrawn, &withdrawn)])
+    VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen)])
 }
 
 fn findings() -> Findings {

@@ -9,20 +9,19 @@ mod grammar;
 mod shape_sigma;
 
 use super::judge::{Alternatives, FoldErrors};
-use super::pool::{Beside, HypothesisSet};
-use super::round::{EstimatedCause, FitState, Fitter};
+use super::regression::Regression;
+use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
-use crate::effect::{DeclaredCause, DeclaredForm, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people};
+use crate::effect::{DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, people};
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
 use shape_sigma::shape_sigmas;
 
-/// What formulas are looked for in: the fitted model, its causes' positions in the pool, and the pool.
+/// What formulas are looked for in: the fitted model, and the rows around it.
 pub(super) struct FormulaSearch<'a, 'b> {
     pub state: &'b FitState,
-    pub set: &'b [usize],
-    pub pool: &'b HypothesisSet<'a>,
+    pub view: &'b RoundView<'a>,
     pub survey: &'b Survey<'a>,
     pub fitter: &'b Fitter<'b>,
 }
@@ -41,15 +40,16 @@ impl FormulaSearch<'_, '_> {
     }
 
     fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
-        let nameless = |form: &Form| form.cause().is_nameless() || form.is(&JointTable);
+        let nameless = |form: &Form| form.cause().is_nameless();
         if finding.forms.is_empty() || !finding.forms.iter().all(nameless) {
             return None;
         }
-        let members: Vec<usize> = (0..self.set.len()).filter(|i| finding.forms.contains(&self.state.causes[*i].form)).collect();
+        let causes = &self.state.causes;
+        let members: Vec<usize> = (0..causes.len()).filter(|i| finding.forms.contains(&causes[*i].form)).collect();
         let (place, variables) = self.variables(finding)?;
-        let mut rest: Vec<usize> = (0..self.set.len()).filter(|i| !members.contains(i)).map(|i| self.set[i]).collect();
-        rest.sort_unstable();
-        let beside = Beside::of(self.pool, &rest);
+        let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
+        let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
+        let beside = Regression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
         let Place::Joint(joint) = finding.place else { return None };
         let unit = if self.survey.robot.is_revolute(joint) { "rad" } else { "mm" };
         let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
@@ -126,7 +126,7 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
-    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &Beside) -> Option<Candidate> {
+    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &Regression) -> Option<Candidate> {
         let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
         let gains = beside.gains(&forms);
@@ -150,7 +150,7 @@ impl FormulaSearch<'_, '_> {
         &self,
         candidate: &Candidate,
         variables: &[NamedVariable],
-        beside: &Beside,
+        beside: &Regression,
         coefficients: Option<Vec<(f64, f64)>>,
     ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;

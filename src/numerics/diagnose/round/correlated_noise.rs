@@ -10,7 +10,7 @@ use super::stretches::thinned;
 use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::criteria::cells::SETTLED;
 use crate::diagnose::table::{Answer, FoundCell};
-use crate::diagnose::pool::{orthonormal, project};
+use crate::diagnose::linear::{orthonormal, project};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
 use crate::robot::Measurements;

@@ -2,9 +2,8 @@
 
 use super::fit_state::{FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, thinned};
-use crate::diagnose::pool::HypothesisSet;
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::effect::{Hypothesis, Survey};
+use crate::effect::Survey;
 use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
@@ -41,8 +40,8 @@ impl<'a> RoundView<'a> {
         Survey::new(robot, data, rows, &self.torque, &self.compliance)
     }
 
-    /// The causes of a model over what is left without them.
-    pub fn causes(&self, now: &FitState, fitter: &Fitter) -> HypothesisSet<'_> {
+    /// What is left of the rows without the causes of a model.
+    pub fn without_causes(&self, now: &FitState) -> Vec<f64> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();
         for cause in &now.causes {
@@ -51,9 +50,7 @@ impl<'a> RoundView<'a> {
                 residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        let jacobian = problem.jacobian(fitter.free());
-        let hypotheses = now.causes.iter().map(|cause| Hypothesis::new(cause.form.clone(), 1)).collect();
-        HypothesisSet::new(problem, &jacobian, &residual, hypotheses)
+        residual
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::evidence::EvidenceRows;
 use crate::criteria::cells::{EVEN, FAR, UNEVEN};
-use crate::diagnose::pool::{orthonormal, project};
+use crate::diagnose::linear::{orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Form, Law, Motion, Variable};
 use faer::linalg::matmul::matmul;

@@ -160,7 +160,7 @@ fn cell(free: FreeShape, log_prior: f64) -> CauseCell {
 }
 
 /// Places of cells without a name.
-fn places(survey: &Survey) -> Vec<Place> {
+pub(super) fn places(survey: &Survey) -> Vec<Place> {
     let joints = 0..survey.joints();
     let length = |link: usize| (survey.robot.point(link + 1) - survey.robot.point(link)).norm();
     let links = joints.clone().filter(|link| link + 1 < survey.joints() && length(*link) > SHORT);
@@ -170,7 +170,7 @@ fn places(survey: &Survey) -> Vec<Place> {
 }
 
 /// The motions of a place, by family.
-fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
+pub(super) fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
     match place {
         // What carries the first joint is the base.
         Place::Joint(joint) if joint > 0 && survey.robot.is_revolute(joint) => vec![
@@ -191,7 +191,7 @@ fn families(place: Place, survey: &Survey) -> Vec<Vec<Motion>> {
 }
 
 /// What a motion of a place may follow, by kind.
-fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
+pub(super) fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
     let joints = survey.joints();
     let own = match place {
         Place::Joint(joint) | Place::Links(joint, _) => joint,
@@ -240,7 +240,7 @@ fn kinds(place: Place, motion: Motion, survey: &Survey) -> Vec<Kind> {
 }
 
 /// The cause whose cell is this motion over this variable in all shapes, if there is one.
-fn listed_as(motion: Motion, of: Variable, over: Over, survey: &Survey) -> Option<&'static str> {
+pub(super) fn listed_as(motion: Motion, of: Variable, over: Over, survey: &Survey) -> Option<&'static str> {
     let last = survey.joints().saturating_sub(1);
     match (motion, of, over) {
         // What the last joint carries is the tool.

@@ -7,6 +7,7 @@
 mod answer;
 mod cell;
 mod evidence;
+mod forms;
 mod frame;
 mod generated;
 mod listed;
@@ -15,6 +16,7 @@ mod search;
 mod state;
 
 pub(crate) use answer::{Answer, FoundCell};
+pub(crate) use forms::forms_of;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;

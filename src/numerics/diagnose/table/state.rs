@@ -7,7 +7,7 @@ use super::cell::{CellShape, ShapeGroup};
 use super::evidence::{EvidenceRows, GroupEvidence, evidence};
 use super::frame::{SearchRows, UnitColumns, product, view};
 use crate::criteria::cells::NU;
-use crate::diagnose::pool::dot;
+use crate::diagnose::linear::dot;
 use crate::effect::Form;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};

@@ -12,7 +12,7 @@ use crate::criteria::words::{NAMELESS, NOT_NOISE};
 use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::misfit::Misfit;
 use crate::diagnose::round::{FitState, Fitter};
-use crate::diagnose::types::{ClosedForm, Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
+use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::diagnose::words::{Ground, slower_than_noise, statement};
 use crate::effect::names;
 use crate::estimate::{Model, cross_validate};
@@ -61,7 +61,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(unseen(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
-    let formulas = formulas(&last, fitter, &findings);
+    let formulas = FormulaSearch { state: &last.state, view: last.view, survey: last.survey, fitter }.of_all(&findings);
     let LastRound { state, answer, .. } = last;
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
@@ -80,7 +80,6 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         next_measurements: next(&findings, fitter.question.own),
         findings: within(findings, &model),
         formulas,
-        withdrawn: Vec::new(),
         clock: data.has_clock(),
         not_observable,
         signature,
@@ -122,13 +121,6 @@ fn basis(fitter: &Fitter, rows: &[usize]) -> NoiseBasis {
         _ if sigma > 0.0 => NoiseBasis::Inferred,
         stated => stated,
     }
-}
-
-/// Formulas for findings without a name.
-fn formulas(last: &LastRound, fitter: &Fitter, findings: &[Finding]) -> Vec<ClosedForm> {
-    let pool = last.view.causes(&last.state, fitter);
-    let set: Vec<usize> = (0..last.state.causes.len()).collect();
-    FormulaSearch { state: &last.state, set: &set, pool: &pool, survey: last.survey, fitter }.of_all(findings)
 }
 
 /// The share, in what all findings gain, of those without a name or with one that is more probably wrong.

@@ -10,7 +10,7 @@ use crate::diagnose::table::FoundCell;
 use crate::diagnose::types::{Evidence, Finding, RivalCause};
 use crate::diagnose::words::{left_out, not_so, sentence, small, told};
 use crate::effect::{
-    Basis, Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people,
+    Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
 
@@ -109,7 +109,7 @@ fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<Mo
     let state = &last.state;
     let Model { robot, stack, x, .. } = &state.model;
     let fitted = FittedForms { robot, stack, x, data: last.survey.data, rows: &state.screening.kept, called, forms };
-    let modelled = forms.first()?.cause().in_the_model(&fitted)?;
+    let modelled = turned_holder(&fitted)?;
     (!last.excludes(modelled.same.0)).then_some(modelled)
 }
 
@@ -172,11 +172,7 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Paramete
 /// Joint and range over which the errors of a joint hold.
 fn valid(forms: &[Form], last: &LastRound) -> Option<(usize, [f64; 2])> {
     let Place::Joint(joint) = forms[0].place() else { return None };
-    let table = forms.iter().find_map(|form| match form.term()?.basis() {
-        Basis::Fading { low, high, .. } => Some([low, high]),
-        _ => None,
-    });
-    Some((joint, table.unwrap_or(last.survey.range[joint])))
+    Some((joint, last.survey.range[joint]))
 }
 
 /// Rms size (m or rad) of some causes over the fitted rows, with what geometry could absorb of them.

@@ -3,7 +3,7 @@
 use crate::criteria::words::STILL;
 use crate::diagnose::types::Finding;
 use crate::diagnose::words::small;
-use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause};
+use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause};
 use crate::observation::{Dimension, noise, only_brought};
 use crate::robot::Measurements;
 
@@ -103,7 +103,7 @@ pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<
         for rival in finding.rivals.iter().take(2) {
             let how = least([finding.effect, rival.effect].into_iter().filter_map(|name| {
                 let declared = own.iter().find(|declared| declared.name() == name);
-                declared.map_or_else(|| cause(name)?.about().measure, |declared| declared.about().measure)
+                declared.map_or_else(|| cause(name)?.measure, |declared| declared.about().measure)
             }));
             let how = how.unwrap_or(POSES);
             out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
@@ -114,7 +114,7 @@ pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<
 
 /// What is not a pose and may tell two effects apart, where there is such a thing.
 pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
-    least([a, b].into_iter().filter_map(|name| cause(name)?.about().measure))
+    least([a, b].into_iter().filter_map(|name| cause(name)?.measure))
 }
 
 fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {

@@ -6,14 +6,15 @@ use super::check::DeclarationFault;
 use super::declaration::EffectDeclaration;
 use super::pattern::DeclaredPattern;
 use super::seat::Seat;
-use super::words::filled;
-use crate::effect::{Cause, CauseDescription, Measure, Place, Summary, figure, names};
+use crate::effect::sentence::filled;
+use crate::effect::{Cause, Form, Measure, MotionRow, Place, Summary, figure};
+use serde::de::Error as _;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
 
 /// A declared effect, understood.
 pub struct DeclaredCause {
-    about: &'static CauseDescription,
+    about: &'static Cause,
     declaration: EffectDeclaration,
     pattern: DeclaredPattern,
 }
@@ -46,7 +47,7 @@ impl DeclaredCause {
             (None, _) => "any".into(),
         };
         Self {
-            about: Box::leak(Box::new(CauseDescription {
+            about: Box::leak(Box::new(Cause {
                 name: kept(declaration.name.clone()),
                 place: kept(declaration.place.clone()),
                 formula: kept(declaration.law.0.join("; ")),
@@ -54,13 +55,23 @@ impl DeclaredCause {
                 confounded: stated(&declaration.confounded, "-"),
                 needs: stated(&declaration.needs, &needs),
                 of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
-                absorbs_residual: &[names::UNKNOWN],
                 measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
-                ..CauseDescription::PLAIN
+                motion: Some(MotionRow { propose: |_| Vec::new(), sentence: Some(sentence), read: undeclared }),
+                ..Cause::PLAIN
             })),
             declaration,
             pattern,
         }
+    }
+
+    /// Its row of the table of causes.
+    pub fn about(&self) -> &'static Cause {
+        self.about
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.about.name
     }
 
     /// What the user wrote.
@@ -79,38 +90,41 @@ impl DeclaredCause {
     }
 }
 
-impl Cause for DeclaredCause {
-    fn about(&self) -> &'static CauseDescription {
-        self.about
-    }
+/// What a mechanic is told of a finding that a declared effect is.
+fn sentence(summary: &Summary) -> String {
+    let Some(own) = summary.forms.iter().find_map(|form| form.declared()).map(|form| form.declaration()) else {
+        return String::new();
+    };
+    let per = own.declaration.per.as_ref().map(|per| format!(" per {per}")).unwrap_or_default();
+    let numbers: Vec<String> = (summary.parameters.iter())
+        .map(|number| {
+            let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
+            format!("{}{unit}{per}", figure(number.value, 1))
+        })
+        .collect();
+    let shape: Vec<(String, f64)> = summary.forms.iter().flat_map(|form| form.shape_numbers()).collect();
+    let known = |word: &str| match word {
+        "place" => summary.place.to_string(),
+        "value" => numbers.first().cloned().unwrap_or_default(),
+        "values" => numbers.join(", "),
+        other => shape.iter().find(|(name, _)| name == other).map_or_else(String::new, |(_, value)| figure(*value, 2)),
+    };
+    let said = match &own.declaration.sentence {
+        Some(sentence) => filled(sentence, &known),
+        None => {
+            let laws = own.about.formula;
+            format!("{} errs as {} says, {laws}: {}", summary.place, own.about.name, known("values"))
+        }
+    };
+    let ends = |(name, value): &(String, f64)| {
+        let range = own.declaration.shape.get(name)?;
+        (*value <= range.from || *value >= range.to).then(|| format!("; {name} ends at its bound {value}"))
+    };
+    let ends: Vec<String> = shape.iter().filter_map(ends).collect();
+    format!("{said}{}", ends.concat())
+}
 
-    fn sentence(&self, summary: &Summary) -> String {
-        let per = self.declaration.per.as_ref().map(|per| format!(" per {per}")).unwrap_or_default();
-        let numbers: Vec<String> = (summary.parameters.iter())
-            .map(|number| {
-                let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
-                format!("{}{unit}{per}", figure(number.value, 1))
-            })
-            .collect();
-        let shape: Vec<(String, f64)> = summary.forms.iter().flat_map(|form| form.shape_numbers()).collect();
-        let known = |word: &str| match word {
-            "place" => summary.place.to_string(),
-            "value" => numbers.first().cloned().unwrap_or_default(),
-            "values" => numbers.join(", "),
-            other => shape.iter().find(|(name, _)| name == other).map_or_else(String::new, |(_, value)| figure(*value, 2)),
-        };
-        let said = match &self.declaration.sentence {
-            Some(sentence) => filled(sentence, &known),
-            None => {
-                let laws = self.about.formula;
-                format!("{} errs as {} says, {laws}: {}", summary.place, self.about.name, known("values"))
-            }
-        };
-        let ends = |(name, value): &(String, f64)| {
-            let range = self.declaration.shape.get(name)?;
-            (*value <= range.from || *value >= range.to).then(|| format!("; {name} ends at its bound {value}"))
-        };
-        let ends: Vec<String> = shape.iter().filter_map(ends).collect();
-        format!("{said}{}", ends.concat())
-    }
+/// A form of a declared effect is read with its declaration, not by its name.
+fn undeclared(_: &serde_json::Value) -> serde_json::Result<Form> {
+    Err(serde_json::Error::custom("a declared effect without its declaration"))
 }

@@ -5,8 +5,8 @@ use super::formula::{Formula, Function};
 use super::parse::parse;
 use super::quantity::{Constant, QuantityKind, RowQuantity};
 use super::seat::{Moves, PLACES, Seat};
-use super::words::holes;
 use crate::effect::cause;
+use crate::effect::sentence::holes;
 use crate::error::nearest;
 use crate::units::Unit;
 

@@ -152,8 +152,8 @@ impl PartialEq for DeclaredForm {
 }
 
 impl Placed for DeclaredForm {
-    fn cause(&self) -> &'static dyn Cause {
-        self.cause
+    fn cause(&self) -> &'static Cause {
+        self.cause.about()
     }
 
     fn place(&self) -> Place {

@@ -12,7 +12,6 @@ mod parse;
 mod pattern;
 mod quantity;
 mod seat;
-mod words;
 
 pub use cause::DeclaredCause;
 pub use check::DeclarationFault;

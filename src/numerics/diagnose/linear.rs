@@ -3,9 +3,6 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-/// What is left of a squared column of unit length below this is rounding and second order, not sight.
-pub(super) const INVISIBLE: f64 = 1e-6;
-
 /// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
 pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
     let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
@@ -25,19 +22,6 @@ pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
     matmul(share.as_mut(), Accum::Replace, basis.transpose(), columns.as_ref(), 1.0, Par::Seq);
     matmul(columns.as_mut(), Accum::Add, basis, share.as_ref(), -1.0, Par::Seq);
-}
-
-/// Gram matrix of some columns, row by row.
-pub(super) fn gram(columns: &[&[f64]]) -> Vec<f64> {
-    let q = columns.len();
-    let mut gram = vec![0.0; q * q];
-    for i in 0..q {
-        for j in 0..=i {
-            gram[i * q + j] = dot(columns[i], columns[j]);
-            gram[j * q + i] = gram[i * q + j];
-        }
-    }
-    gram
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
