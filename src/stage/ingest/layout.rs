@@ -4,6 +4,7 @@
 
 use super::columns::Columns;
 use super::wide::{HELD, WideTargets};
+use crate::raw::Mark;
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,6 +80,15 @@ pub enum Decimal {
     Point,
     /// `0,365`
     Comma,
+}
+
+impl Decimal {
+    pub(super) fn mark(self) -> Mark {
+        match self {
+            Self::Point => Mark::Point,
+            Self::Comma => Mark::Comma,
+        }
+    }
 }
 
 /// An axis of the tracker's frame.
