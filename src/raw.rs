@@ -16,7 +16,7 @@ mod workbook;
 pub use columns::{ColumnRows, has_columns};
 pub use delimited::{Delimiter, TextLayout, TextRows, fields, unquoted_text};
 pub use not_read::not_read;
-pub use number::{Mark, NumberFault, number, number_of_any_mark};
+pub use number::{DecimalMark, NumberFault, number, number_of_any_mark};
 pub use record::{Record, RecordReader, failed};
 pub use text::{decoded_text, is_utf16, shown, without_utf16};
 pub use workbook::{Workbook, is_workbook};

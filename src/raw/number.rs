@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// The mark before decimals that a file announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
+pub enum DecimalMark {
     /// `0.365`
     Point,
     /// `0,365`
@@ -28,10 +28,10 @@ pub enum NumberFault {
 
 /// A finite number, or why the cell is none. Blanks around it were removed.
 #[inline]
-pub fn number(cell: &[u8], mark: Mark) -> Result<f64, NumberFault> {
-    let is_pointed = mark == Mark::Comma && cell.contains(&b'.');
+pub fn number(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
+    let is_pointed = mark == DecimalMark::Comma && cell.contains(&b'.');
     let mut room = [0; 32];
-    let plain = match room.get_mut(..cell.len()).filter(|_| mark == Mark::Comma) {
+    let plain = match room.get_mut(..cell.len()).filter(|_| mark == DecimalMark::Comma) {
         Some(copy) => {
             copy.copy_from_slice(cell);
             copy.iter_mut().find(|byte| **byte == b',').into_iter().for_each(|comma| *comma = b'.');
@@ -49,10 +49,10 @@ pub fn number(cell: &[u8], mark: Mark) -> Result<f64, NumberFault> {
 pub fn number_of_any_mark(text: &str) -> Option<f64> {
     let is_ended = text.ends_with(',');
     let by = |mark| number(text.as_bytes(), mark).ok();
-    by(Mark::Point).or_else(|| by(Mark::Comma).filter(|_| !is_ended))
+    by(DecimalMark::Point).or_else(|| by(DecimalMark::Comma).filter(|_| !is_ended))
 }
 
-fn unusual(cell: &[u8], mark: Mark) -> Result<f64, NumberFault> {
+fn unusual(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
     let Ok(text) = std::str::from_utf8(cell) else { return Err(NumberFault::Text) };
     if text.is_empty() {
         return Err(NumberFault::Blank);
@@ -62,19 +62,19 @@ fn unusual(cell: &[u8], mark: Mark) -> Result<f64, NumberFault> {
     }
     let with_point = || text.replacen(',', ".", 1);
     match mark {
-        Mark::Point => read(text).map_err(|fault| match read(&with_point()) {
+        DecimalMark::Point => read(text).map_err(|fault| match read(&with_point()) {
             Ok(_) => NumberFault::Comma,
             Err(_) => fault,
         }),
-        Mark::Comma if text.contains('.') => Err(read(text).map_or(NumberFault::Text, |_| NumberFault::Point)),
-        Mark::Comma => read(&with_point()),
+        DecimalMark::Comma if text.contains('.') => Err(read(text).map_or(NumberFault::Text, |_| NumberFault::Point)),
+        DecimalMark::Comma => read(&with_point()),
     }
 }
 
 /// The number without its marks of thousands, with a decimal point, where it has both marks and every group is one: `1.234,56` with a decimal
 /// comma, `1,234.56` with a point.
-fn ungrouped(text: &str, mark: Mark) -> Option<Cow<'_, str>> {
-    let (group, mark) = if mark == Mark::Comma { ('.', ',') } else { (',', '.') };
+fn ungrouped(text: &str, mark: DecimalMark) -> Option<Cow<'_, str>> {
+    let (group, mark) = if mark == DecimalMark::Comma { ('.', ',') } else { (',', '.') };
     let (whole, rest) = text.split_once(mark).filter(|(whole, rest)| whole.contains(group) && !rest.contains(mark))?;
     let mut groups = whole.strip_prefix('-').unwrap_or(whole).split(group);
     let are_digits = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
@@ -94,36 +94,36 @@ mod tests {
 
     #[test]
     fn the_announced_decimal_mark_is_the_only_one() {
-        assert_eq!(number(b"-0,000212669", Mark::Comma), Ok(-0.000212669));
-        assert_eq!(number(b"2,02011E+13", Mark::Comma), Ok(2.02011e13));
-        assert_eq!(number(b"17", Mark::Comma), Ok(17.0));
-        assert_eq!(number(b"0.365", Mark::Comma), Err(NumberFault::Point));
-        assert_eq!(number(b"+1.5e-3", Mark::Point), Ok(1.5e-3));
-        assert_eq!(number(b"0,365", Mark::Point), Err(NumberFault::Comma));
-        assert_eq!(number(b"1,234,5", Mark::Point), Err(NumberFault::Text));
-        assert_eq!(number(b"1,234,5", Mark::Comma), Err(NumberFault::Text));
+        assert_eq!(number(b"-0,000212669", DecimalMark::Comma), Ok(-0.000212669));
+        assert_eq!(number(b"2,02011E+13", DecimalMark::Comma), Ok(2.02011e13));
+        assert_eq!(number(b"17", DecimalMark::Comma), Ok(17.0));
+        assert_eq!(number(b"0.365", DecimalMark::Comma), Err(NumberFault::Point));
+        assert_eq!(number(b"+1.5e-3", DecimalMark::Point), Ok(1.5e-3));
+        assert_eq!(number(b"0,365", DecimalMark::Point), Err(NumberFault::Comma));
+        assert_eq!(number(b"1,234,5", DecimalMark::Point), Err(NumberFault::Text));
+        assert_eq!(number(b"1,234,5", DecimalMark::Comma), Err(NumberFault::Text));
     }
 
     #[test]
     fn marks_of_thousands_are_read_where_both_marks_stand_and_every_group_has_three_digits() {
-        assert_eq!(number(b"1.234,56", Mark::Comma), Ok(1234.56));
-        assert_eq!(number(b"-12.345.678,5", Mark::Comma), Ok(-12_345_678.5));
-        assert_eq!(number(b"1,234.56", Mark::Point), Ok(1234.56));
+        assert_eq!(number(b"1.234,56", DecimalMark::Comma), Ok(1234.56));
+        assert_eq!(number(b"-12.345.678,5", DecimalMark::Comma), Ok(-12_345_678.5));
+        assert_eq!(number(b"1,234.56", DecimalMark::Point), Ok(1234.56));
         // One mark alone may be either.
-        assert_eq!(number(b"1.234", Mark::Comma), Err(NumberFault::Point));
+        assert_eq!(number(b"1.234", DecimalMark::Comma), Err(NumberFault::Point));
         for cell in ["1.23,4", "1.2345,6", "1234.567,8", ".123,4", "1.234,5,6"] {
-            assert_eq!(number(cell.as_bytes(), Mark::Comma), Err(NumberFault::Text), "{cell}");
+            assert_eq!(number(cell.as_bytes(), DecimalMark::Comma), Err(NumberFault::Text), "{cell}");
         }
     }
 
     #[test]
     fn what_is_not_finite_is_no_number() {
         for cell in ["NaN", "inf", "-Infinity", "1e999"] {
-            assert_eq!(number(cell.as_bytes(), Mark::Point), Err(NumberFault::NotFinite), "{cell}");
+            assert_eq!(number(cell.as_bytes(), DecimalMark::Point), Err(NumberFault::NotFinite), "{cell}");
         }
-        assert_eq!(number(b"", Mark::Point), Err(NumberFault::Blank));
-        assert_eq!(number(b"--", Mark::Point), Err(NumberFault::Text));
-        assert_eq!(number(b"1\xb5", Mark::Point), Err(NumberFault::Text));
+        assert_eq!(number(b"", DecimalMark::Point), Err(NumberFault::Blank));
+        assert_eq!(number(b"--", DecimalMark::Point), Err(NumberFault::Text));
+        assert_eq!(number(b"1\xb5", DecimalMark::Point), Err(NumberFault::Text));
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod columns;
 mod copies;
 mod external;
 mod held;
+mod ids;
 mod joined;
 mod later;
 mod layout;

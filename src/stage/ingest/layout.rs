@@ -4,7 +4,7 @@
 
 use super::columns::Columns;
 use super::wide::{HELD, WideTargets};
-use crate::raw::Mark;
+use crate::raw::DecimalMark;
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,10 +83,10 @@ pub enum Decimal {
 }
 
 impl Decimal {
-    pub(super) fn mark(self) -> Mark {
+    pub(super) fn mark(self) -> DecimalMark {
         match self {
-            Self::Point => Mark::Point,
-            Self::Comma => Mark::Comma,
+            Self::Point => DecimalMark::Point,
+            Self::Comma => DecimalMark::Comma,
         }
     }
 }

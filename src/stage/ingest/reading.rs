@@ -152,12 +152,12 @@ pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: Lim
 }
 
 /// What is done of a bar, by all who work on it.
-pub(super) struct Progress<'a> {
+pub(super) struct FileProgress<'a> {
     context: &'a Context<'a>,
     done: AtomicU64,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> FileProgress<'a> {
     pub(super) fn begin(context: &'a Context<'a>, what: &str, total: Option<u64>, unit: &str) -> Self {
         context.services.begin(what, total, unit);
         Self { context, done: AtomicU64::new(0) }
@@ -170,7 +170,7 @@ impl<'a> Progress<'a> {
 
 /// Counts units of work up to the next sign of progress.
 pub(super) struct ProgressCounter<'a> {
-    progress: &'a Progress<'a>,
+    progress: &'a FileProgress<'a>,
     rows: u64,
     told: u64,
 }

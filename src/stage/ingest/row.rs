@@ -7,7 +7,7 @@ use super::layout::{Decimal, LimitPolicy};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal, refuse};
 use super::slots::KindSlots;
-use crate::raw::{Mark, NumberFault, Record, decoded_text, number};
+use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
@@ -18,7 +18,7 @@ const LARGEST_SEQUENCE: i64 = 1 << 52;
 /// Reads rows of one file.
 pub(super) struct RowReader<'a> {
     pub binding: Binding,
-    mark: Mark,
+    mark: DecimalMark,
     limits: LimitPolicy,
     arm: &'a RobotJoints,
     /// Sequence number of the last usable row.

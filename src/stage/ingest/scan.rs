@@ -6,10 +6,10 @@
 use super::Ingest;
 use super::arm::RobotJoints;
 use super::held::{HeldRows, RowSource};
+use super::ids::{FileIds, RowHasher, behind, narrow};
 use super::layout::{Duplicates, FileLayout, Join};
 use super::motion::{JointSamples, Track};
-use super::pair::{FileIds, RowHasher, behind, narrow};
-use super::reading::{OpenedFile, Progress};
+use super::reading::{FileProgress, OpenedFile};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
 use crate::error::{Error, Result};
@@ -126,7 +126,7 @@ pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: 
         opened.push(open);
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
-    let progress = Progress::begin(context, &format!("reading {}", labels.join(", ")), sizes.into_iter().sum(), "bytes");
+    let progress = FileProgress::begin(context, &format!("reading {}", labels.join(", ")), sizes.into_iter().sum(), "bytes");
     let scans: Vec<Result<Scan>> = opened
         .into_par_iter()
         .enumerate()
@@ -142,7 +142,7 @@ fn file(
     index: usize,
     mut open: OpenedFile,
     (arm, most): (&RobotJoints, usize),
-    progress: &Progress,
+    progress: &FileProgress,
     context: &Context,
 ) -> Result<Scan> {
     let layout = &settings.files[index];

@@ -6,7 +6,7 @@ use super::arm::RobotJoints;
 use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
-use super::reading::{self, OpenedFile, Progress};
+use super::reading::{self, FileProgress, OpenedFile};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
 use super::rejections::Rejections;
@@ -192,7 +192,7 @@ impl<'a> MotionRows<'a> {
         let size = source.size;
         let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
         let label = open.label.clone();
-        let progress = Progress::begin(context, &format!("reading {label}"), size, "bytes");
+        let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
         let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);

@@ -5,7 +5,7 @@ use super::later::Continuation;
 use super::layout::FileLayout;
 use super::noise::NoiseSlots;
 use super::pair::FileDecision;
-use super::reading::Progress;
+use super::reading::FileProgress;
 use super::recorded::RecordedRow;
 use super::rejections::Rejections;
 use super::{scan, verdict};
@@ -29,7 +29,7 @@ pub(super) fn write(
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
     let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).take(one.leading()));
     let rows = rows.map(|(scan, decision)| verdict::accepted(scan, decision)).sum();
-    let progress = Progress::begin(context, "writing the recording", Some(rows), "rows");
+    let progress = FileProgress::begin(context, "writing the recording", Some(rows), "rows");
     let mut recording = RecordingChunks::new(decided, context)?;
     let mut rejected = Rejections::new(names, context)?;
     for (one, gap) in decided.iter().zip(std::iter::once(None).chain(gaps.iter().map(Some))) {
@@ -46,7 +46,7 @@ fn file(
     decided: &JoinDecisions,
     index: usize,
     layout: &FileLayout,
-    mut recording: Option<(&mut RecordingChunks, &Progress)>,
+    mut recording: Option<(&mut RecordingChunks, &FileProgress)>,
     rejected: &mut Rejections,
     context: &Context,
 ) -> Result<()> {
