@@ -37,7 +37,8 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
         return Ok(one(Err("no text".into())));
     }
     let mut lines: Vec<String> = Vec::new();
-    for line in BufReader::new(raw::without_utf16(reader)).take(LOOKED).split(b'\n').take(LINES) {
+    let text = raw::without_utf16(reader).map_err(failed)?;
+    for line in BufReader::new(text).take(LOOKED).split(b'\n').take(LINES) {
         let line = line.map_err(failed)?;
         lines.push(shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
     }

@@ -4,7 +4,10 @@
 use encoding_rs::WINDOWS_1252;
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use std::borrow::Cow;
-use std::io::Read;
+use std::io::{self, Cursor, Read};
+
+/// Bytes that are handed on in one piece at first.
+const HEAD: u64 = 1 << 16;
 
 /// Whether the bytes begin with a byte-order mark of UTF-16.
 pub fn is_utf16(head: &[u8]) -> bool {
@@ -12,8 +15,12 @@ pub fn is_utf16(head: &[u8]) -> bool {
 }
 
 /// The same bytes without a byte-order mark, UTF-16 as UTF-8.
-pub fn without_utf16(source: impl Read + Send + 'static) -> Box<dyn Read + Send> {
-    Box::new(DecodeReaderBytesBuilder::new().utf8_passthru(true).strip_bom(true).build(source))
+pub fn without_utf16(source: impl Read + Send + 'static) -> io::Result<Box<dyn Read + Send>> {
+    let mut text = DecodeReaderBytesBuilder::new().utf8_passthru(true).strip_bom(true).build(source);
+    // The decoder's first piece is some bytes, and whoever reads looks at how the first lines end.
+    let mut head = Vec::new();
+    (&mut text).take(HEAD).read_to_end(&mut head)?;
+    Ok(Box::new(Cursor::new(head).chain(text)))
 }
 
 /// The text, or nothing where the bytes are neither UTF-8 nor Windows-1252.
@@ -55,11 +62,13 @@ mod tests {
         for bytes in [little, big] {
             assert!(is_utf16(&bytes));
             let mut read = String::new();
-            without_utf16(std::io::Cursor::new(bytes)).read_to_string(&mut read).expect("a text");
+            without_utf16(Cursor::new(bytes)).expect("a reader").read_to_string(&mut read).expect("a text");
             assert_eq!(read, text);
         }
         let mut plain = Vec::new();
-        without_utf16(&b"\xef\xbb\xbf\xb5m"[..]).read_to_end(&mut plain).expect("bytes");
-        assert_eq!(plain, b"\xb5m");
+        let mut reader = without_utf16(&b"\xef\xbb\xbf\xb5m and more"[..]).expect("a reader");
+        assert_eq!(reader.read(&mut [0; 99]).expect("bytes"), 11);
+        reader.read_to_end(&mut plain).expect("bytes");
+        assert_eq!(plain, b"");
     }
 }

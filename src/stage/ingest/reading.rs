@@ -51,7 +51,8 @@ fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordRea
     } else if let Some(what) = not_read(head) {
         return Err(Error::data(label, what));
     } else {
-        Box::new(TextRows::open(BufReader::with_capacity(BUFFER, raw::without_utf16(reader)), label, text)?)
+        let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
+        Box::new(TextRows::open(BufReader::with_capacity(BUFFER, reader), label, text)?)
     })
 }
 
