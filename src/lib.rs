@@ -13,7 +13,7 @@
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
 //! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
-//! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
+//! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather) as records of cells, numbers in cells | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
@@ -76,7 +76,7 @@
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
-//! | kind of raw file | `src/stage/ingest/<name>.rs`, which hands out records | its `mod`, and one line in `FORMATS` of `src/stage/ingest/reading.rs` |
+//! | kind of raw file | `src/raw/<name>.rs`, which hands out records | its `mod`, and one line in `records` of `src/stage/ingest/reading.rs` |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in [`table::TABLES`] |

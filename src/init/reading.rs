@@ -3,8 +3,8 @@
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
-use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook, not_read};
-use crate::stage::ingest::{ListedTable, encoding, first_rows};
+use crate::raw::{self, ColumnRows, Record, RecordReader, Workbook, has_columns, is_utf16, is_workbook, not_read, shown};
+use crate::stage::ingest::ListedTable;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -19,31 +19,39 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let failed = |error: std::io::Error| Error::store(&place, format!("cannot be read: {error}"));
     let mut reader = BufReader::new(file);
     let head = reader.fill_buf().map_err(failed)?;
+    let one = |sheet: std::result::Result<Sheet, String>| vec![sheet.unwrap_or_else(Sheet::not_understood)];
     if is_workbook(head) {
         return Ok(sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]));
     }
     if let Some(language) = listing(&raw::ending(path), head) {
         let table = ListedTable::read(reader, &place, language);
-        return Ok(vec![table.map_or_else(|error| Sheet::not_understood(error.to_string()), Sheet::of_program)]);
+        return Ok(one(table.map(Sheet::of_program).map_err(|error| error.to_string())));
     }
     if let Some(what) = not_read(head) {
-        return Ok(vec![Sheet::not_understood(what.into())]);
+        return Ok(one(Err(what.into())));
+    }
+    if has_columns(head) {
+        return Ok(one(columns(reader, &place).map_err(|error| error.to_string())));
     }
     if !is_utf16(head) && head.contains(&0) {
-        let rows = first_rows(Box::new(reader), &place, LINES);
-        return Ok(vec![match rows {
-            Ok(rows) => rows.map_or_else(|| Sheet::not_understood("no text".into()), Sheet::of_columns),
-            Err(error) => Sheet::not_understood(error.to_string()),
-        }]);
+        return Ok(one(Err("no text".into())));
     }
     let mut lines: Vec<String> = Vec::new();
-    let wide = is_utf16(head);
-    let text: Box<dyn BufRead> = if wide { Box::new(BufReader::new(Utf16Reader::new(reader))) } else { Box::new(reader) };
-    for line in text.take(LOOKED).split(b'\n').take(LINES) {
+    let text = raw::without_utf16(reader).map_err(failed)?;
+    for line in BufReader::new(text).take(LOOKED).split(b'\n').take(LINES) {
         let line = line.map_err(failed)?;
-        lines.push(encoding::shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+        lines.push(shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
     }
     Ok(vec![Sheet::of(&lines)])
+}
+
+/// The first rows of a file of columns.
+fn columns(source: impl Read, label: &str) -> Result<Sheet> {
+    let (mut rows, mut record, mut found) = (ColumnRows::open(source, label)?, Record::default(), Vec::new());
+    while found.len() <= LINES && rows.next(&mut record)? {
+        found.push(record.cells());
+    }
+    Ok(Sheet::of_columns(found.remove(0), found))
 }
 
 fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {

@@ -1,7 +1,10 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
-use crate::stage::ingest::{FirstRows, ListedTable};
+use crate::raw::{Delimiter, fields, unquoted_text};
+use crate::stage::ingest::ListedTable;
 use crate::units::{Unit, written};
+
+pub(super) use crate::raw::number_of_any_mark as number;
 
 /// So many lines say what separates fields.
 const ENOUGH: usize = 500;
@@ -41,24 +44,6 @@ struct Content<'a> {
     text: &'a str,
 }
 
-/// A number as people write it: finite, with a point or one comma, and thousands in groups of three where both marks stand.
-pub(super) fn number(text: &str) -> Option<f64> {
-    let plain = || text.replacen(',', ".", 1).parse().ok().filter(|_| !text.ends_with(','));
-    let value = text.parse::<f64>().ok().or_else(plain).or_else(|| grouped(text));
-    value.filter(|value| value.is_finite())
-}
-
-/// `1.234,56` and `1,234.56`: the mark that stands last and once is the decimal one.
-fn grouped(text: &str) -> Option<f64> {
-    let mark = decimal_mark(text).filter(|_| text.contains('.') && text.contains(','))?;
-    let (whole, rest) = text.split_once(mark).filter(|(_, rest)| !rest.contains(['.', ',']))?;
-    let mut groups = whole.trim_start_matches('-').split(['.', ',']);
-    let first = groups.next().is_some_and(|digits| (1..=3).contains(&digits.len()));
-    let others = groups.all(|digits| digits.len() == 3);
-    let digits = whole.replace(['.', ','], "");
-    (first && others).then(|| format!("{digits}.{rest}").parse().ok())?
-}
-
 /// The last mark of a number.
 fn decimal_mark(text: &str) -> Option<char> {
     text.chars().rev().find(|letter| ['.', ','].contains(letter))
@@ -70,20 +55,9 @@ fn numeric(cells: &[String]) -> usize {
 
 /// The fields of a line; a quoted one may hold the delimiter. A blank stands for any run of blanks and tabs.
 fn cells(line: &str, delimiter: char) -> Vec<String> {
-    let mut cells = vec![String::new()];
-    let mut quoted = false;
-    for letter in line.trim_end().chars() {
-        let ends = if delimiter == ' ' { letter == ' ' || letter == '\t' } else { letter == delimiter };
-        if letter == '"' {
-            quoted = !quoted;
-        } else if ends && !quoted {
-            cells.push(String::new());
-        } else if let Some(cell) = cells.last_mut() {
-            cell.push(letter);
-        }
-    }
-    let trimmed = cells.into_iter().map(|cell| cell.trim().to_string());
-    trimmed.filter(|cell| delimiter != ' ' || !cell.is_empty()).collect()
+    let delimiter = if delimiter == ' ' { Delimiter::Whitespace } else { Delimiter::Byte(delimiter as u8) };
+    let line = line.trim_end();
+    fields(line, delimiter).0.into_iter().map(|place| unquoted_text(&line[place]).into_owned()).collect()
 }
 
 /// Without the blank cells that a delimiter at the end of a line makes.
@@ -124,7 +98,7 @@ impl Sheet {
     }
 
     /// A file of columns.
-    pub fn of_columns(FirstRows { names, rows }: FirstRows) -> Self {
+    pub fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         Self { delimiter: ',', header: true, names, rows, ..Self::default() }
     }
 
@@ -330,7 +304,6 @@ mod tests {
 
     #[test]
     fn marks_of_thousands_are_no_decimal_marks() {
-        assert_eq!([number("1.234,56"), number("-1,234.5"), number("1.23,4")], [Some(1234.56), Some(-1234.5), None]);
         let german = sheet("Name;X;Y;Z\nP1;1.234,50;-2.000,25;900,5\nP2;1.235,50;-2.001,25;901,5\n");
         assert_eq!((german.comma, german.is_numeric(1)), (true, true));
     }

@@ -1,42 +1,29 @@
 //! `ingest`: from raw files (text, workbooks, columns) to one recording; what is not used goes to `rejected` with file, line and reason.
 //!
-//! Rows are judged and written in one reading, as if each were used with its partner. Where the whole says otherwise (a point id twice, rows
-//! joined by time, velocities), files are read a second time to write. A table that is begun of a file that is refused is dropped, and memory
-//! stays bounded. Per file, accepted + rejected = read.
+//! Every file is read once (`reading`), row by row: bytes to records (`raw`), records to quantities or the reason why not (`row`). What all rows
+//! together say is decided (`pair`, `verdict`), then rows are written (`write`) from memory (`held`), of files that are too large for that by
+//! a second reading. Per file, accepted + rejected = read.
 
 mod arm;
 mod axes;
-mod batches;
 mod bind;
 mod channel;
 mod check;
 mod clock;
 mod columns;
 mod copies;
-mod cut;
-pub mod encoding;
 mod external;
-mod feather;
-mod fields;
-mod fingerprint;
+mod held;
 mod ids;
 mod joined;
-mod judged;
-mod judging;
 mod later;
 mod layout;
-mod lines;
 mod listing;
-mod lists;
 mod mapped;
 mod motion;
 mod noise;
-mod number;
-mod once;
 mod pair;
-mod parquet;
 mod reading;
-mod record;
 mod recorded;
 mod refusal;
 mod rejections;
@@ -48,7 +35,6 @@ mod torques;
 mod twice;
 mod verdict;
 mod wide;
-mod workbook;
 mod write;
 
 pub use clock::is_clock_time;
@@ -62,7 +48,6 @@ pub use mapped::{
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
-pub use reading::{FirstRows, first_rows};
 pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 pub use wide::WideTargets;
 
@@ -74,7 +59,9 @@ use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::sync::Arc;
+
+/// Bytes of memory for rows that are held until they are written: some five million of ten numbers.
+const MOST_HELD: usize = 1 << 30;
 
 /// Reads raw files into a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -153,7 +140,7 @@ impl Stage for Ingest {
         first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?.map(Arc::new);
+        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?;
         let mut faults = Vec::new();
         for layout in self.measurements().iter().flat_map(|one| &one.files) {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -165,18 +152,24 @@ impl Stage for Ingest {
         if faults.is_empty() { Ok(None) } else { Err(Error::Data(faults)) }
     }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
+        self.run_holding(MOST_HELD, reads, context)
+    }
+}
+
+impl Ingest {
+    /// Runs the stage with rows held in so many bytes of memory; files of which more would be held are read again to write them.
+    pub fn run_holding(&self, most: usize, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
         let faults = self.check();
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        let arm = Arc::new(arm::RobotJoints::of(&reads.robot)?);
+        let arm = arm::RobotJoints::of(&reads.robot)?;
         let measurements = self.measurements();
-        let (mut scanned, mut written) = (Vec::new(), None);
+        let mut scanned = Vec::new();
         for one in &measurements {
-            let (mut scans, ahead) = once::read(one, &arm, measurements.len() == 1, context)?;
-            let decisions = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
+            let scans = scan::files(one, &arm, most / measurements.len(), context)?;
+            let decisions = pair::decide(&scans, self.join.as_ref(), self.duplicates);
             verdict::judge(one, &scans, &decisions, &arm, context)?;
-            written = ahead.filter(|ahead| ahead.stands(&decisions));
             scanned.push((scans, decisions));
         }
         copies::refuse(&scanned)?;
@@ -186,16 +179,11 @@ impl Stage for Ingest {
             .map(|((settings, (scans, decisions)), names)| joined::JoinDecisions { settings, arm: &arm, scans, decisions, names })
             .collect();
         let gaps: Vec<Option<f64>> = self.later.iter().map(LaterFiles::gap).collect();
-        let (recording, rejected) = match (written, decided.as_slice()) {
-            (Some(written), [one]) => written.finish(one, context)?,
-            _ => write::write(&decided, &gaps, &names, context)?,
-        };
+        let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })
     }
-}
 
-impl Ingest {
     /// How the file that holds the joints counts them.
     fn convention(&self, arm: &arm::RobotJoints) -> JointConvention {
         let Some(joints) = self.files.iter().find_map(|file| file.columns.joint("q")) else {

@@ -1,7 +1,7 @@
 //! A planned motion as delimited text: times and joints in even steps; what it needs of torque is appended, all else stays.
 
 use super::fields::{TextField, fields};
-use super::text::delimiter;
+use super::text::{delimiter, parse};
 use super::{MOST, decimal};
 use crate::description::RobotDescription;
 use crate::dynamics::{JudgedRow, NeededTorques, PlannedMotion};
@@ -92,13 +92,11 @@ impl<'a> Trajectory<'a> {
                 }
             };
             for (column, (_, cell)) in columns.iter().zip(cells) {
-                let comma = self.delimiter != ',' && cell.contains(',');
-                let value = if comma { cell.replace(',', ".").parse::<f64>() } else { cell.parse::<f64>() };
-                let Some(value) = value.ok().filter(|value| value.is_finite()) else {
+                let Ok(Some(value)) = parse(&cell, self.delimiter) else {
                     fault(format!("`{cell}` is not a number"));
                     continue;
                 };
-                if comma {
+                if self.delimiter != ',' && cell.contains(',') {
                     self.point = ',';
                 }
                 put(&mut self.motion, row, *column, value);

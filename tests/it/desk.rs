@@ -45,7 +45,8 @@ impl Desk {
         let inputs = frames.into_iter().map(|port| port.into_iter().map(input).collect()).collect();
         self.written(&(entry.writes)(), |context| stage.run(inputs, context))
     }
-    fn written(
+    /// Runs what gives the tables of these ports.
+    pub fn written(
         &self,
         ports: &[Port],
         run: impl FnOnce(&Context) -> Result<Vec<Output>>,

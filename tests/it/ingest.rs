@@ -21,7 +21,9 @@ use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};
 use calib::robot::SigmaSource;
 use calib::stage::ingest::{Ingest, IngestReads};
+use calib::store::frame::Frame;
 use calib::table::{Intake, Recording, Rejected, Robot, RobotRow};
+use std::collections::BTreeMap;
 
 /// A robot table with limits of half a turn (revolute, `r`) or 0 to 3 m (prismatic, `p`).
 pub fn robot(kinds: &str, half_turns: f64) -> Robot {
@@ -78,7 +80,10 @@ fn settings(yaml: &str) -> Ingest {
 }
 
 fn take(desk: &Desk, yaml: &str, robot: Robot) -> Result<Taken> {
-    let tables = desk.run(&settings(yaml), IngestReads { robot })?;
+    taken(desk.run(&settings(yaml), IngestReads { robot })?)
+}
+
+fn taken(tables: BTreeMap<&'static str, Vec<Frame>>) -> Result<Taken> {
     let mut chunks = table::<Recording>(&tables).into_iter();
     let first = chunks.next().unwrap();
     assert!(chunks.next().is_none(), "more than one chunk");

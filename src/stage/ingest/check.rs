@@ -3,7 +3,6 @@
 use super::axes::{self, needed};
 use super::clock::CLOCK;
 use super::columns::Columns;
-use super::fields::delimiter;
 use super::later;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn, TextColumn};
@@ -11,6 +10,7 @@ use super::noise;
 use super::{Ingest, twice};
 use crate::error::{Fault, counted, nearest};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
+use crate::raw::Delimiter;
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 
@@ -36,7 +36,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
 }
 
 pub(super) fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
-    if delimiter(&file.delimiter).is_none() {
+    if Delimiter::parse(&file.delimiter).is_none() {
         let message = format!("delimiter `{}`; allowed: one ASCII character, `tab` or `whitespace`", file.delimiter);
         faults.push(Fault::new(format!("{place}.delimiter"), message));
     }

@@ -1,11 +1,8 @@
 //! Axes beside the arm's own (a track, a positioner) that a file records and nobody mapped: where they move, base or workpiece move with them.
 
-use super::arm::RobotJoints;
-use super::layout::{Decimal, FileLayout};
-use super::reading::{self, OpenedFile};
-use super::record::RecordFields;
+use super::layout::Decimal;
 use crate::error::{Error, Result};
-use crate::stage::Context;
+use crate::raw::{Record, number};
 
 /// What such columns are called at controllers, without a number and a unit.
 const NAMES: [&str; 11] =
@@ -33,42 +30,44 @@ fn external(name: &str) -> Option<&'static str> {
     is_one.then(|| unit.unwrap_or("deg"))
 }
 
-/// Fails where a column of such an axis, which is not mapped, changes while the file's joints are read.
-pub(super) fn must_stand(opened: &OpenedFile, layout: &FileLayout, arm: &RobotJoints, context: &Context) -> Result<()> {
-    if !layout.columns.has("q") {
-        return Ok(());
+/// Columns of such axes, while a file is read.
+pub(super) struct ExternalAxes {
+    /// Column, name, unit, least and largest number.
+    columns: Vec<(usize, String, &'static str, [f64; 2])>,
+    decimal: Decimal,
+}
+
+impl ExternalAxes {
+    /// Those among columns that nobody mapped, of a file with joints.
+    pub(super) fn among<'n>(unmapped: impl Iterator<Item = (usize, &'n String)>, has_joints: bool, decimal: Decimal) -> Self {
+        let axes = unmapped
+            .filter(|_| has_joints)
+            .filter_map(|(column, name)| Some((column, name.clone(), external(name)?, [f64::INFINITY, f64::NEG_INFINITY])));
+        Self { columns: axes.collect(), decimal }
     }
-    let names = opened.unmapped.iter().filter_map(|(column, name)| Some((*column, name, external(name)?)));
-    let mut all: Vec<(usize, &String, &str, [f64; 2])> =
-        names.map(|(column, name, unit)| (column, name, unit, [f64::INFINITY, f64::NEG_INFINITY])).collect();
-    if all.is_empty() {
-        return Ok(());
-    }
-    let mut rows = reading::records(context.services.open(&layout.file)?, layout)?;
-    let mut record = RecordFields::default();
-    rows.next(&mut record)?;
-    rows.skip(layout.skip_below_header)?;
-    while rows.next(&mut record)? {
-        for (column, .., [least, most]) in &mut all {
-            let text = record.field(*column).and_then(|field| std::str::from_utf8(field).ok()).unwrap_or_default();
-            let comma = rows.is_text() && layout.decimal == Decimal::Comma;
-            let number = if comma { text.replace(',', ".").parse::<f64>() } else { text.parse() };
-            if let Some(number) = number.ok().filter(|number| number.abs() < NONE) {
+
+    /// Takes a row.
+    pub(super) fn see(&mut self, record: &Record) {
+        for (column, .., [least, most]) in &mut self.columns {
+            if let Some(number) = number(record.field(*column), self.decimal.mark()).ok().filter(|number| number.abs() < NONE) {
                 (*least, *most) = (least.min(number), most.max(number));
             }
         }
     }
-    let moves = |(.., unit, [least, most]): &&(usize, &String, &str, [f64; 2])| {
-        most - least > STILL[usize::from(matches!(*unit, "rad" | "m"))]
-    };
-    let Some((_, name, _, [least, most])) = all.iter().find(moves) else { return Ok(()) };
-    let message = format!(
-        "column `{name}` is an axis beside the robot's {} joints, and moves from {least} to {most}: what stands on it moves with it, and the \
-         robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or another \
-         name for the column if it is no axis",
-        arm.joints()
-    );
-    Err(Error::data(&opened.label, message))
+
+    /// Fails where one of them moved, beside so many joints of the arm.
+    pub(super) fn must_stand(&self, label: &str, joints: usize) -> Result<()> {
+        let moves = |(.., unit, [least, most]): &&(usize, String, &str, [f64; 2])| {
+            most - least > STILL[usize::from(matches!(*unit, "rad" | "m"))]
+        };
+        let Some((_, name, _, [least, most])) = self.columns.iter().find(moves) else { return Ok(()) };
+        let message = format!(
+            "column `{name}` is an axis beside the robot's {joints} joints, and moves from {least} to {most}: what stands on it moves with it, \
+             and the robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or \
+             another name for the column if it is no axis"
+        );
+        Err(Error::data(label, message))
+    }
 }
 
 #[cfg(test)]

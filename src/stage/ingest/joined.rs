@@ -2,18 +2,18 @@
 
 use super::Ingest;
 use super::arm::RobotJoints;
+use super::held::HeldRows;
 use super::layout::Join;
 use super::pair::{FileDecision, NONE};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
-use super::scan::{PackedRows, Scan};
+use super::scan::Scan;
 use crate::observation::{KINDS, Part};
-use std::sync::Arc;
 
 /// What all files give and decide together.
 pub(super) struct JoinDecisions<'a> {
     pub settings: &'a Ingest,
-    pub arm: &'a Arc<RobotJoints>,
+    pub arm: &'a RobotJoints,
     pub scans: &'a [Scan],
     pub decisions: &'a [FileDecision],
     /// Names of the files in tables.
@@ -56,10 +56,10 @@ impl JoinDecisions<'_> {
         (*partner != NONE).then_some(u64::from(*partner))
     }
     /// The rows of the other files that belong to a row of the first, and where they are.
-    pub(super) fn partners(&self, row: &RecordedRow, decision: &FileDecision) -> impl Iterator<Item = (usize, &PackedRows)> {
+    pub(super) fn partners(&self, row: &RecordedRow, decision: &FileDecision) -> impl Iterator<Item = (usize, &HeldRows)> {
         decision.partners.iter().zip(self.scans.iter().skip(1)).filter_map(|(partner, scan)| {
             let number = partner.get((row.number - 1) as usize)?.checked_sub(1)?;
-            Some((number as usize, scan.packed.as_ref()?))
+            Some((number as usize, &scan.held))
         })
     }
     /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
@@ -69,10 +69,10 @@ impl JoinDecisions<'_> {
         if file == 0 {
             return row.values.get(time).copied();
         }
-        let packed = self.scans.get(file)?.packed.as_ref()?;
-        let slot = packed.slots.iter().position(|slot| *slot == time)?;
-        let at = (self.number(file, 0, row, decision)? as usize - 1) * packed.slots.len() + slot;
-        Some(packed.values.get(at)? - if file == 1 { *offset_s } else { 0.0 })
+        let held = &self.scans.get(file)?.held;
+        let slot = held.places.iter().position(|slot| *slot == time)?;
+        let at = (self.number(file, 0, row, decision)? as usize - 1) * held.places.len() + slot;
+        Some(held.values.get(at)? - if file == 1 { *offset_s } else { 0.0 })
     }
     /// How much later (s) than its joints the point of a row was measured.
     pub(super) fn later(&self, moving: usize, row: &RecordedRow, decision: &FileDecision) -> Option<f64> {
@@ -101,7 +101,7 @@ impl JoinDecisions<'_> {
             row.points.as_slice()
         } else {
             let at = (self.number(file, index, row, decision)? as usize - 1) * names.len();
-            self.scans.get(file)?.packed.as_ref()?.points.get(at..at + names.len())?
+            self.scans.get(file)?.held.points.get(at..at + names.len())?
         };
         let seen = names.zip(points).zip(1..).filter(|((_, point), _)| !point[0].is_nan());
         Some(seen.map(|((name, point), at)| (at, name, *point)).collect())

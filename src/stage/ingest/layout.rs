@@ -4,6 +4,7 @@
 
 use super::columns::Columns;
 use super::wide::{HELD, WideTargets};
+use crate::raw::DecimalMark;
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,6 +80,15 @@ pub enum Decimal {
     Point,
     /// `0,365`
     Comma,
+}
+
+impl Decimal {
+    pub(super) fn mark(self) -> DecimalMark {
+        match self {
+            Self::Point => DecimalMark::Point,
+            Self::Comma => DecimalMark::Comma,
+        }
+    }
 }
 
 /// An axis of the tracker's frame.

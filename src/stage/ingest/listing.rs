@@ -1,12 +1,9 @@
 //! Joint positions that a controller's program declares, as the rows of a table: `name`, the six joints, the external axes.
 
-use super::layout::FileLayout;
-use super::record::{Buffered, FileFormat, RecordFields, RecordReader, failed};
 use crate::error::{Error, Fault, Result, counted};
-use crate::program::{JointList, Language, MOST_BYTES, joint_list, listing};
-use crate::raw;
-use std::io::{BufRead, Read};
-use std::path::Path;
+use crate::program::{JointList, Language, MOST_BYTES, joint_list};
+use crate::raw::{Record, RecordReader, failed};
+use std::io::Read;
 
 /// Names of the columns: as the languages call the axes.
 const RAPID: [&str; 12] =
@@ -58,11 +55,8 @@ impl ListedTable {
     }
 }
 
-pub(super) const FORMAT: FileFormat = FileFormat { is: |ending, head| listing(ending, head).is_some(), has_sheets: false, open };
-
-fn open(mut source: Buffered, label: &str, _layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
-    let head = source.fill_buf().map_err(|error| failed(label, &error))?;
-    let language = listing(&raw::ending(Path::new(label)), head).ok_or_else(|| Error::Bug(format!("{label} is no program")))?;
+/// Opens a program.
+pub(super) fn open(source: impl Read, label: &str, language: Language) -> Result<Box<dyn RecordReader>> {
     let table = ListedTable::read(source, label, language)?;
     Ok(Box::new(ListingReader { label: label.into(), table, is_named: false, rows: 0 }))
 }
@@ -80,7 +74,7 @@ impl RecordReader for ListingReader {
     fn label(&self) -> &str {
         &self.label
     }
-    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
         if !std::mem::replace(&mut self.is_named, true) {
             record.begin(1);
             self.table.names.iter().for_each(|name| record.push(name.as_bytes()));

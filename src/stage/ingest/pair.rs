@@ -1,9 +1,10 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
-use super::ids::FileIds;
+use super::ids::{FileIds, NamedRow};
 use super::layout::{Duplicates, Join};
 use super::scan::Scan;
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 
 /// No partner.
 pub(super) const NONE: u32 = u32::MAX;
@@ -36,21 +37,18 @@ impl FileDecision {
 }
 
 /// Decides for all files. Files that continue each other share their ids.
-pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
+pub(super) fn decide(scans: &[Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
     let mut decisions: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
+    let ids: Vec<(usize, &FileIds)> = scans.iter().map(|scan| &scan.ids).enumerate().collect();
     if let Some(Join::Append {}) | None = join {
-        let mut ids = FileIds::default();
-        scans.iter_mut().for_each(|scan| ids.append(std::mem::take(&mut scan.ids)));
-        single(&mut ids, duplicates, &mut decisions);
+        single(&ids, duplicates, &mut decisions);
         return decisions;
     }
-    for scan in scans.iter_mut() {
-        single(&mut scan.ids, duplicates, &mut decisions);
-    }
+    ids.chunks(1).for_each(|one| single(one, duplicates, &mut decisions));
     let ([first, others @ ..], [one, decisions_of_others @ ..]) = (scans, decisions.as_mut_slice()) else { return decisions };
-    for (index, (second, other)) in others.iter_mut().zip(decisions_of_others.iter()).enumerate() {
+    for (index, (second, other)) in others.iter().zip(decisions_of_others.iter()).enumerate() {
         let pairs = match join {
-            Some(Join::Id {}) => by_id(&first.ids, &mut second.ids),
+            Some(Join::Id {}) => by_id((&first.ids, one), (&second.ids, other)),
             Some(Join::Time { tolerance_s, offset_s }) => {
                 let times = |scan: &Scan, decision: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
                     let rows = scan.times.iter().filter(|(_, number)| !decision.twins.contains_key(number));
@@ -84,36 +82,60 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
     decisions
 }
 
-/// Leaves one row of each id, or none. Copies of one row are one row: they do not contradict each other.
-fn single(ids: &mut FileIds, duplicates: Duplicates, decisions: &mut [FileDecision]) {
-    let mut dropped = false;
-    ids.each_repeated(|same| {
-        let ([first, .., last], keep) = (same, duplicates) else { return };
-        let copies = same.iter().all(|key| key.content == first.content);
-        let stays = match keep {
-            Duplicates::Reject if !copies => None,
-            Duplicates::Last => Some(last),
-            _ => Some(first),
-        };
-        for key in same.iter().filter(|key| Some(*key) != stays) {
-            let twin = stays.unwrap_or(if key == first { last } else { first });
-            let copied = stays.is_some_and(|stays| stays.content == key.content);
-            if let Some(decision) = decisions.get_mut(key.file as usize) {
-                decision.twins.insert(key.number, Twin { file: twin.file, line: twin.line, copied });
-            }
-            dropped = true;
+/// Leaves one row of each id, or none, of files by their index. Copies of one row are one row: they do not contradict each other.
+fn single(files: &[(usize, &FileIds)], duplicates: Duplicates, decisions: &mut [FileDecision]) {
+    if duplicates == Duplicates::Keep || (files.len() == 1 && !files[0].1.is_mixed) {
+        return;
+    }
+    let mut first: HashMap<&[u8], (usize, NamedRow)> = HashMap::new();
+    let mut repeated: HashMap<&[u8], Vec<(usize, NamedRow)>> = HashMap::new();
+    for (file, (id, row)) in files.iter().flat_map(|(file, ids)| ids.rows().map(move |named| (*file, named))) {
+        match first.entry(id) {
+            Entry::Vacant(entry) => drop(entry.insert((file, row))),
+            Entry::Occupied(entry) => repeated.entry(id).or_insert_with(|| vec![*entry.get()]).push((file, row)),
         }
-    });
-    if dropped {
-        let is_twin =
-            |file: u32, number| decisions.get(file as usize).is_some_and(|decision| decision.twins.contains_key(&number));
-        ids.retain(|key| !is_twin(key.file, key.number));
+    }
+    for same in repeated.values() {
+        let [first, .., last] = same.as_slice() else { continue };
+        let copies = same.iter().all(|(_, row)| row.content == first.1.content);
+        let stays = match duplicates {
+            Duplicates::Reject if !copies => None,
+            Duplicates::Last => Some(same.len() - 1),
+            _ => Some(0),
+        };
+        for (k, (file, row)) in same.iter().enumerate().filter(|(k, _)| Some(*k) != stays) {
+            let twin = stays.map_or(if k == 0 { last } else { first }, |stays| &same[stays]);
+            let copied = stays.is_some() && twin.1.content == row.content;
+            if let Some(decision) = decisions.get_mut(*file) {
+                decision.twins.insert(row.number, Twin { file: twin.0 as u32, line: twin.1.line, copied });
+            }
+        }
     }
 }
 
 /// Pairs of rows with one id; every id once.
-fn by_id(first: &FileIds, second: &mut FileIds) -> Vec<(u32, u32)> {
-    first.keys().iter().filter_map(|key| Some((key.number, second.find((key.hash, key.check))?))).collect()
+fn by_id(first: (&FileIds, &FileDecision), second: (&FileIds, &FileDecision)) -> Vec<(u32, u32)> {
+    let used = |(ids, decision): (&'_ FileIds, &'_ FileDecision)| -> Vec<(usize, u32)> {
+        let rows = ids.rows.iter().map(|row| row.number).enumerate();
+        rows.filter(|(_, number)| !decision.twins.contains_key(number)).collect()
+    };
+    let (mine, theirs) = (used(first), used(second));
+    let is = |place: usize, id: &[u8]| second.0.ids.bytes(place) == Some(id);
+    let mut known: Option<HashMap<&[u8], usize>> = None;
+    let (mut pairs, mut next) = (Vec::with_capacity(mine.len().min(theirs.len())), 0);
+    for (place, number) in mine {
+        let Some(id) = first.0.ids.bytes(place) else { continue };
+        // As nearly every pair of files has it, ids stand in one order.
+        let found = Some(next).filter(|at| theirs.get(*at).is_some_and(|(place, _)| is(*place, id))).or_else(|| {
+            let ids = || theirs.iter().enumerate().filter_map(|(at, (place, _))| Some((second.0.ids.bytes(*place)?, at)));
+            known.get_or_insert_with(|| ids().collect()).get(id).copied()
+        });
+        if let Some(at) = found {
+            pairs.push((number, theirs[at].1));
+            next = at + 1;
+        }
+    }
+    pairs
 }
 
 /// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
@@ -156,7 +178,6 @@ fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fingerprint::hash_of;
     use super::super::recorded::RecordedRow;
     use super::*;
 
@@ -184,16 +205,32 @@ mod tests {
         let stays = |duplicates| {
             let (mut ids, mut decisions) = (FileIds::default(), [FileDecision::default()]);
             for (id, number) in ["B", "A", "B", "B"].into_iter().zip(1..) {
-                let (key, content) = (hash_of(id), number);
-                let row = RecordedRow { id: id.into(), number, line: number + 1, key, content, ..RecordedRow::default() };
-                ids.push(&row, 0, "a.csv").unwrap();
+                let row = RecordedRow { id: id.into(), number, line: number + 1, ..RecordedRow::default() };
+                ids.push(&row, number, "a.csv").unwrap();
             }
-            single(&mut ids, duplicates, &mut decisions);
+            single(&[(0, &ids)], duplicates, &mut decisions);
             let twins: Vec<(u32, u32)> = decisions[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
-            (ids.keys().iter().map(|key| key.number).collect::<Vec<_>>(), twins)
+            let pairs = by_id((&ids, &decisions[0]), (&ids, &decisions[0]));
+            (pairs.iter().map(|(number, _)| *number).collect::<Vec<_>>(), twins)
         };
         assert_eq!(stays(Duplicates::Reject), (vec![2], vec![(1, 5), (3, 2), (4, 2)]));
         assert_eq!(stays(Duplicates::First), (vec![1, 2], vec![(3, 2), (4, 2)]));
         assert_eq!(stays(Duplicates::Last), (vec![2, 4], vec![(1, 5), (3, 5)]));
+    }
+
+    #[test]
+    fn ids_find_each_other_in_any_order() {
+        let ids = |names: &[&str]| {
+            let mut ids = FileIds::default();
+            for (name, number) in names.iter().zip(1..) {
+                ids.push(&RecordedRow { id: (*name).into(), number, ..RecordedRow::default() }, number, "a.csv").unwrap();
+            }
+            ids
+        };
+        let pairs =
+            |one: &[&str], other: &[&str]| by_id((&ids(one), &FileDecision::default()), (&ids(other), &FileDecision::default()));
+        assert_eq!(pairs(&["A", "B", "C", "D"], &["X", "A", "B", "D", "C"]), [(1, 2), (2, 3), (3, 5), (4, 4)]);
+        assert_eq!(pairs(&["A", "Q", "B"], &["A", "B", "C"]), [(1, 1), (3, 2)]);
+        assert_eq!(pairs(&["A"], &[]), []);
     }
 }

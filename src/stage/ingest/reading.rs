@@ -1,89 +1,87 @@
 //! One reading of one file from top to bottom, row by row.
 
 use super::arm::RobotJoints;
-use super::bind::{FileHeader, bind};
-use super::encoding;
-use super::judging::JudgedFile;
+use super::bind::{Binding, FileHeader, bind};
+use super::external::ExternalAxes;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
-use super::record::{BUFFER, FileFormat, RecordFields, RecordReader, failed};
+use super::listing;
 use super::recorded::RecordedRow;
 use super::refusal::RowRefusal;
 use super::row::RowReader;
-use super::{feather, lines, listing, parquet, workbook};
 use crate::error::{Error, Result, counted};
-use crate::raw;
+use crate::program::listing as language;
+use crate::raw::{
+    self, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook, failed, has_columns, is_workbook, not_read,
+};
 use crate::stage::{Context, OpenedInput};
 use crate::table::RejectedRow;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
+/// Bytes that are read at a time; what says of which kind a file is stands among the first of them.
+const BUFFER: usize = 1 << 16;
 
-/// Every kind of file; the first that a file is, text at last.
-const FORMATS: &[&FileFormat] = &[&workbook::FORMAT, &listing::FORMAT, &parquet::FORMAT, &feather::FORMAT, &lines::FORMAT];
-
-/// Opens a file of any kind.
-pub(super) fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+/// Opens a file of any kind: the first that a file is, text at last.
+fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordReader>> {
+    let label = &source.label;
     let mut reader = BufReader::with_capacity(BUFFER, source.reader);
-    let head = reader.fill_buf().map_err(|error| failed(&source.label, &error))?;
-    let ending = raw::ending(Path::new(&source.label));
-    let format = FORMATS.iter().find(|format| (format.is)(&ending, head)).expect("text at last");
-    if let Some(sheet) = layout.sheet.as_ref().filter(|_| !format.has_sheets) {
-        let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
-        return Err(Error::data(&source.label, message));
-    }
-    (format.open)(reader, &source.label, layout)
-}
-
-/// Names of the columns and the first rows, up to `most`, of a file of columns; none of a file of another kind.
-pub fn first_rows(source: Box<dyn Read + Send>, label: &str, most: usize) -> Result<Option<FirstRows>> {
-    let mut reader = BufReader::with_capacity(BUFFER, source);
     let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
-    let mut rows = match () {
-        () if (parquet::FORMAT.is)("", head) => parquet::read(reader, label)?,
-        () if (feather::FORMAT.is)("", head) => feather::read(reader, label)?,
-        () => return Ok(None),
-    };
-    let mut record = RecordFields::default();
-    let mut found = Vec::new();
-    while found.len() <= most && rows.next(&mut record)? {
-        let cell = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
-        found.push((0..record.len()).map(cell).collect::<Vec<String>>());
+    let is_book = is_workbook(head);
+    if let Some(sheet) = layout.sheet.as_ref().filter(|_| !is_book) {
+        let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
+        return Err(Error::data(label, message));
     }
-    Ok(Some(FirstRows { names: found.remove(0), rows: found }))
-}
-
-/// How a file of columns begins.
-pub struct FirstRows {
-    /// Of the columns.
-    pub names: Vec<String>,
-    /// Their cells, as text.
-    pub rows: Vec<Vec<String>>,
+    let delimiter = Delimiter::parse(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
+    let FileLayout { comment, header_in_comment, skip, .. } = layout.clone();
+    let text = TextLayout { delimiter, comment, header_in_comment, skip };
+    Ok(if is_book {
+        let data = |message: String| Error::data(label, message);
+        let mut book = Workbook::read(reader).map_err(data)?;
+        let name = book.sheet(layout.sheet.as_deref()).map_err(data)?;
+        let lines = book.lines(&name, if layout.decimal == Decimal::Comma { ',' } else { '.' }).map_err(data)?;
+        let text = TextLayout { delimiter: Delimiter::Byte(b'\t'), ..text };
+        Box::new(TextRows::open(Cursor::new(lines), &format!("{label} sheet `{name}`"), text)?)
+    } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
+        listing::open(reader, label, language)?
+    } else if has_columns(head) {
+        Box::new(ColumnRows::open(reader, label)?)
+    } else if let Some(what) = not_read(head) {
+        return Err(Error::data(label, what));
+    } else {
+        let reader = raw::without_utf16(reader).map_err(|error| failed(label, &error))?;
+        Box::new(TextRows::open(BufReader::with_capacity(BUFFER, reader), label, text)?)
+    })
 }
 
 /// An opened file below its header.
-pub(super) struct OpenedFile {
+pub(super) struct OpenedFile<'a> {
     pub label: String,
-    pub rows: JudgedFile,
+    reader: Box<dyn RecordReader>,
+    judge: RowReader<'a>,
+    /// The present row as it stands.
+    record: Record,
+    /// It was read before it was asked for, to see how wide rows are.
+    is_ahead: bool,
     /// What was left out of the file as a whole.
     remark: Option<String>,
-    /// Columns that nothing is read from, with their names.
-    pub unmapped: Vec<(usize, String)>,
+    /// Axes beside the arm's that nothing is read from.
+    pub external: ExternalAxes,
     pub row: RecordedRow,
 }
 
-impl OpenedFile {
+impl<'a> OpenedFile<'a> {
     /// Opens a file and finds its columns.
-    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &Arc<RobotJoints>, limits: LimitPolicy) -> Result<Self> {
-        let mut rows = records(source, layout)?;
-        let label = rows.label().to_string();
-        let (header, decimal) = if rows.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
-        let mut record = RecordFields::default();
-        if !rows.next(&mut record)? {
-            let lines = counted(rows.lines(), "line");
-            let message = match (rows.bytes(), header) {
+    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
+        let mut reader = records(source, layout)?;
+        let label = reader.label().to_string();
+        let (header, decimal) = if reader.is_text() { (layout.header, layout.decimal) } else { (true, Decimal::Point) };
+        let mut record = Record::default();
+        if !reader.next(&mut record)? {
+            let lines = counted(reader.lines(), "line");
+            let message = match (reader.bytes(), header) {
                 (0, true) => "is empty; allowed: a header and at least one data row".to_string(),
                 (0, false) => "is empty; allowed: at least one data row".to_string(),
                 (_, true) => format!("has no header: {lines}, all empty, comments or skipped"),
@@ -93,70 +91,101 @@ impl OpenedFile {
         }
         let mut head = FileHeader { label: label.clone(), line: record.line, width: record.len(), names: None };
         if header {
-            let name = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
-            let mut names: Vec<String> = (0..record.len()).map(name).collect();
+            let mut names = record.cells();
             // A delimiter at the end of the header makes no column.
             while names.last().is_some_and(String::is_empty) {
                 names.pop();
             }
             head.width = names.len();
             head.names = Some(names);
-            rows.skip(layout.skip_below_header)?;
+            reader.skip(layout.skip_below_header)?;
         }
         let binding = bind(layout, &head, arm)?;
-        let row = RecordedRow::of(&binding, arm);
-        let names = head.names.into_iter().flatten().enumerate();
-        let unmapped = names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column)).collect();
-        let (remark, first) = (rows.remark(), (!header).then_some(record));
-        let rows = JudgedFile::new(rows, first, RowReader::new(binding, decimal, limits, arm));
-        Ok(Self { label, rows, remark, unmapped, row })
+        let row = RecordedRow::empty(arm);
+        let names = head.names.iter().flatten().enumerate();
+        let unmapped = names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column));
+        let external = ExternalAxes::among(unmapped, layout.columns.has("q"), decimal);
+        let (remark, judge) = (reader.remark(), RowReader::new(binding, decimal, limits, arm));
+        Ok(Self { label, reader, judge, record, is_ahead: !header, remark, external, row })
     }
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.remark.iter().chain(&self.rows.binding().missing).cloned().collect()
+        self.remark.iter().chain(&self.binding().missing).cloned().collect()
+    }
+    pub(super) fn binding(&self) -> &Binding {
+        &self.judge.binding
+    }
+    /// Lines of the file read so far; of a file that has no lines its rows.
+    pub(super) fn lines(&self) -> u64 {
+        self.reader.lines()
+    }
+    pub(super) fn bytes(&self) -> u64 {
+        self.reader.bytes()
+    }
+    /// The present row as it stands.
+    pub(super) fn text(&self) -> &[u8] {
+        &self.record.text
     }
     /// The present row as one that is not used, of the file that tables call `name`.
     pub(super) fn rejected(&self, name: &str, refusal: RowRefusal) -> RejectedRow {
-        RejectedRow {
-            file: name.into(),
-            line: self.row.line as i64,
-            point_id: (!self.row.id.is_empty()).then(|| self.row.id.clone()),
-            reason: refusal.reason.word().into(),
-            detail: refusal.detail,
-            text: self.rows.shown(),
-        }
+        self.row.rejected(name, &self.record.text, refusal)
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {
-        self.rows.next(&mut self.row)
+        if !std::mem::take(&mut self.is_ahead) && !self.reader.next(&mut self.record)? {
+            return Ok(None);
+        }
+        self.external.see(&self.record);
+        self.row.number += 1;
+        Ok(Some(self.judge.read(&self.record, &mut self.row)))
     }
 }
 
 /// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
-pub(super) fn header(layout: &FileLayout, arm: Option<&Arc<RobotJoints>>, limits: LimitPolicy, context: &Context) -> Result<()> {
+pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: LimitPolicy, context: &Context) -> Result<()> {
     let source = context.services.open(&layout.file)?;
     if let Some(arm) = arm {
         return OpenedFile::open(source, layout, arm, limits).map(drop);
     }
     let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
-    let arm = Arc::new(RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]));
+    let arm = RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
     OpenedFile::open(source, &layout, &arm, limits).map(drop)
+}
+
+/// What is done of a bar, by all who work on it.
+pub(super) struct FileProgress<'a> {
+    context: &'a Context<'a>,
+    done: AtomicU64,
+}
+
+impl<'a> FileProgress<'a> {
+    pub(super) fn begin(context: &'a Context<'a>, what: &str, total: Option<u64>, unit: &str) -> Self {
+        context.services.begin(what, total, unit);
+        Self { context, done: AtomicU64::new(0) }
+    }
+    /// Counts units of work of one of them up to the next sign of progress.
+    pub(super) fn counter(&self) -> ProgressCounter<'_> {
+        ProgressCounter { progress: self, rows: 0, told: 0 }
+    }
 }
 
 /// Counts units of work up to the next sign of progress.
 pub(super) struct ProgressCounter<'a> {
-    context: &'a Context<'a>,
+    progress: &'a FileProgress<'a>,
     rows: u64,
+    told: u64,
 }
 
-impl<'a> ProgressCounter<'a> {
-    pub(super) fn new(context: &'a Context<'a>) -> Self {
-        Self { context, rows: 0 }
-    }
+impl ProgressCounter<'_> {
     pub(super) fn row(&mut self, done: u64) {
         self.rows += 1;
         if self.rows.is_multiple_of(STRIDE) {
-            self.context.services.advance(done, "");
+            self.tell(done);
         }
+    }
+    pub(super) fn tell(&mut self, done: u64) {
+        let more = done.saturating_sub(std::mem::replace(&mut self.told, done));
+        let all = self.progress.done.fetch_add(more, Ordering::Relaxed) + more;
+        self.progress.context.services.advance(all, "");
     }
 }

@@ -1,7 +1,12 @@
 //! The quantities of one row.
 
 use super::arm::RobotJoints;
-use super::bind::Binding;
+use super::refusal::RowRefusal;
+use crate::raw::shown;
+use crate::table::RejectedRow;
+
+/// Letters that are shown of a row that is not used.
+const SHOWN: usize = 200;
 
 /// The quantities of one row; reused from row to row.
 #[derive(Default)]
@@ -26,15 +31,23 @@ pub(super) struct RecordedRow {
     pub turned: Option<(usize, f64)>,
     /// Nothing stands in any of its fields.
     pub is_blank: bool,
-    /// Hashes of its id, and of all else that it says; 0 where they were not asked for.
-    pub key: (u64, u32),
-    pub content: u64,
 }
 
 impl RecordedRow {
-    /// An empty one of a file.
-    pub(super) fn of(binding: &Binding, arm: &RobotJoints) -> Self {
-        let texts = vec![String::new(); binding.texts.len()];
+    /// An empty one.
+    pub(super) fn empty(arm: &RobotJoints) -> Self {
+        let texts = vec![String::new(); arm.slots.texts().len()];
         Self { texts, values: vec![f64::NAN; arm.slots.count], ..Self::default() }
+    }
+    /// The row as one that is not used, of the file that tables call `name`; `text` is what stands there.
+    pub(super) fn rejected(&self, name: &str, text: &[u8], refusal: RowRefusal) -> RejectedRow {
+        RejectedRow {
+            file: name.into(),
+            line: self.line as i64,
+            point_id: (!self.id.is_empty()).then(|| self.id.clone()),
+            reason: refusal.reason.word().into(),
+            detail: refusal.detail,
+            text: shown(text).chars().take(SHOWN).collect(),
+        }
     }
 }

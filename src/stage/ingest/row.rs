@@ -3,18 +3,12 @@
 use super::arm::RobotJoints;
 use super::bind::{Binding, NumberBinding, TextBinding};
 use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
-use super::encoding;
-use super::fingerprint::{Fingerprints, RowHasher, hash_of};
-use super::judged::JudgedRows;
 use super::layout::{Decimal, LimitPolicy};
-use super::number::{self, NumberFault};
-use super::record::{RecordFields, RecordReader};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal, refuse};
 use super::slots::KindSlots;
-use crate::error::Result as Fallible;
+use crate::raw::{DecimalMark, NumberFault, Record, decoded_text, number};
 use crate::robot::ONE_AND_A_HALF_TURNS;
-use std::sync::Arc;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
@@ -22,59 +16,23 @@ const SLACK: f64 = 1e-6;
 const LARGEST_SEQUENCE: i64 = 1 << 52;
 
 /// Reads rows of one file.
-#[derive(Clone)]
-pub(super) struct RowReader {
-    pub binding: Arc<Binding>,
-    pub decimal: Decimal,
-    pub limits: LimitPolicy,
-    pub arm: Arc<RobotJoints>,
-    pub asked: Fingerprints,
+pub(super) struct RowReader<'a> {
+    pub binding: Binding,
+    mark: DecimalMark,
+    limits: LimitPolicy,
+    arm: &'a RobotJoints,
     /// Sequence number of the last usable row.
     last_sequence: Option<i64>,
     clock: ClockColumn,
-    hasher: RowHasher,
 }
 
-impl RowReader {
-    pub(super) fn new(binding: Binding, decimal: Decimal, limits: LimitPolicy, arm: &Arc<RobotJoints>) -> Self {
-        Self {
-            binding: Arc::new(binding),
-            decimal,
-            limits,
-            arm: arm.clone(),
-            asked: Fingerprints::default(),
-            last_sequence: None,
-            clock: ClockColumn::default(),
-            hasher: RowHasher::default(),
-        }
-    }
-
-    /// Whether what becomes of a row depends on those before it.
-    pub(super) fn looks_back(&self) -> bool {
-        self.binding.sequence.is_some() || self.binding.cells.iter().any(|cell| cell.is_clock)
-    }
-
-    /// Judges all rows of a block, and gives its room back.
-    pub(super) fn block(&mut self, mut block: Box<dyn RecordReader>, rows: &mut JudgedRows) -> Fallible<Vec<u8>> {
-        let binding = self.binding.clone();
-        let (mut record, mut row) = (RecordFields::default(), RecordedRow::of(&binding, &self.arm));
-        rows.clear();
-        while block.next(&mut record)? {
-            let judged = self.read(&record, &mut row);
-            if self.asked.ids {
-                row.key = hash_of(&row.id);
-            }
-            if self.asked.contents {
-                row.content = self.hasher.of(&row, &binding.filled);
-            }
-            rows.push(&binding, &record, &row, judged);
-        }
-        (rows.lines, rows.bytes) = (block.lines(), block.bytes());
-        Ok(block.room())
+impl<'a> RowReader<'a> {
+    pub(super) fn new(binding: Binding, decimal: Decimal, limits: LimitPolicy, arm: &'a RobotJoints) -> Self {
+        Self { binding, mark: decimal.mark(), limits, arm, last_sequence: None, clock: ClockColumn::default() }
     }
 
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
-    fn read(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    pub(super) fn read(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         row.id.clear();
         self.binding.worded.iter().for_each(|place| row.texts[*place].clear());
         row.sequence = None;
@@ -110,12 +68,12 @@ impl RowReader {
         self.measured(row)?;
         self.plausible(row)?;
         if let Some(column) = self.binding.sequence {
-            row.sequence = Some(self.sequence(record.field(column).unwrap_or_default())?);
+            row.sequence = Some(self.sequence(record.field(column))?);
         }
         Ok(())
     }
 
-    fn numbers(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    fn numbers(&mut self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for cell in &self.binding.cells {
             let own = match cell.is_clock {
                 true => Self::moment(&mut self.clock, record, cell)?,
@@ -164,7 +122,7 @@ impl RowReader {
     }
 
     /// The points of a wide row: of a target that was not seen all cells are blank, or 0.
-    fn points(&self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    fn points(&self, record: &Record, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for (target, cells) in &self.binding.points {
             let mut point = [f64::NAN; 3];
             for (value, cell) in point.iter_mut().zip(cells) {
@@ -190,8 +148,8 @@ impl RowReader {
     }
 
     /// The clock time in a cell, s; nothing where it may be blank and is.
-    fn moment(clock: &mut ClockColumn, record: &RecordFields, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
-        let field = record.field(cell.column).unwrap_or_default();
+    fn moment(clock: &mut ClockColumn, record: &Record, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
+        let field = record.field(cell.column);
         match clock.read(field) {
             Some(seconds) => Ok(Some(seconds)),
             None if field.is_empty() && cell.optional => Ok(None),
@@ -205,8 +163,8 @@ impl RowReader {
 
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
     #[inline]
-    fn number(&self, record: &RecordFields, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
-        match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
+    fn number(&self, record: &Record, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
+        match number(record.field(column), self.mark) {
             Ok(value) => Ok(Some(value)),
             Err(NumberFault::Blank) if optional => Ok(None),
             Err(fault) => no_number(record, column, name, fault),
@@ -307,11 +265,11 @@ impl RowReader {
 }
 
 #[cold]
-fn no_number<T>(record: &RecordFields, column: usize, name: &str, fault: NumberFault) -> Result<T, RowRefusal> {
+fn no_number<T>(record: &Record, column: usize, name: &str, fault: NumberFault) -> Result<T, RowRefusal> {
     let shown = shown(record, column);
     let detail = match fault {
         NumberFault::Blank => return refuse(Reason::Blank, format!("{name} is blank")),
-        NumberFault::Text if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
+        NumberFault::Text if ClockTime::parse(record.field(column)).is_some() => {
             format!("{name}: `{shown}` is a clock time, not a number; `unit: {CLOCK}` reads such times")
         }
         NumberFault::Text => format!("{name}: `{shown}` is not a number"),
@@ -323,26 +281,20 @@ fn no_number<T>(record: &RecordFields, column: usize, name: &str, fault: NumberF
 }
 
 /// A field for people, cut at 40 characters.
-fn shown(record: &RecordFields, column: usize) -> String {
-    encoding::shown(record.field(column).unwrap_or_default()).chars().take(40).collect()
+fn shown(record: &Record, column: usize) -> String {
+    crate::raw::shown(record.field(column)).chars().take(40).collect()
 }
 
 fn round(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-fn text(
-    source: &Option<TextBinding>,
-    record: &RecordFields,
-    name: &str,
-    complete: bool,
-    into: &mut String,
-) -> Result<(), RowRefusal> {
+fn text(source: &Option<TextBinding>, record: &Record, name: &str, complete: bool, into: &mut String) -> Result<(), RowRefusal> {
     match source {
         Some(TextBinding::Value(value)) => into.push_str(value),
         Some(TextBinding::Column { column, optional, rule }) => {
-            let bytes = record.field(*column).unwrap_or_default();
-            match encoding::text(bytes).as_deref() {
+            let bytes = record.field(*column);
+            match decoded_text(bytes).as_deref() {
                 Some("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
                 Some("") => {}
                 Some(text) => match rule.applied(text) {

@@ -1,23 +1,22 @@
-//! First reading of a file: which rows are usable, and what is needed to find duplicates and partners.
+//! Reading of the files of a measurement: which rows are usable, what is needed to find duplicates and partners, and the rows themselves.
 //!
-//! Memory: 32 bytes a row where ids are mapped and as a rule (`ids`), 16 where files are joined by time, 1 where they are joined at all; the second
-//! file of a join is held with its numbers. Where the arm moves, 16 bytes a joint and row for its velocities.
+//! Memory: 33 bytes and the id a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all, 16 a joint where the arm
+//! moves; and the rows themselves as far as they may be held (`held`), those that partners are looked for among always.
 
 use super::Ingest;
 use super::arm::RobotJoints;
-use super::external;
-use super::fingerprint::{Fingerprints, behind};
-use super::ids::{FileIds, narrow};
-use super::layout::{FileLayout, Join};
+use super::held::{HeldRows, RowSource};
+use super::ids::{FileIds, RowHasher, behind, narrow};
+use super::layout::{Duplicates, FileLayout, Join};
 use super::motion::{JointSamples, Track};
-use super::reading::{OpenedFile, ProgressCounter};
+use super::reading::{FileProgress, OpenedFile};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
 use crate::error::{Error, Result};
 use crate::stage::Context;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
@@ -49,42 +48,7 @@ impl FileOddities {
     }
 }
 
-/// The numbers and texts of the second file of a join, by data row.
-#[derive(Default)]
-pub(super) struct PackedRows {
-    pub slots: Vec<usize>,
-    pub values: Vec<f64>,
-    pub ids: Vec<String>,
-    /// By [`Slots::texts`](super::slots::Slots::texts); none of those that the file does not have.
-    pub texts: Vec<Option<Vec<String>>>,
-    /// The points of wide rows, of so many targets each.
-    pub points: Vec<[f64; 3]>,
-    pub targets: usize,
-}
-
-impl PackedRows {
-    /// No rows of an opened file.
-    fn of(reading: &OpenedFile, layout: &FileLayout, arm: &RobotJoints) -> Self {
-        Self {
-            slots: reading.rows.binding().slots(),
-            texts: arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect(),
-            targets: reading.rows.binding().points.len(),
-            ..Self::default()
-        }
-    }
-    fn push(&mut self, row: &RecordedRow, named: bool) {
-        self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
-        self.points.extend((0..self.targets).map(|k| row.points.get(k).copied().unwrap_or([f64::NAN; 3])));
-        if named {
-            self.ids.push(row.id.clone());
-        }
-        for (into, text) in self.texts.iter_mut().zip(&row.texts) {
-            into.iter_mut().for_each(|texts| texts.push(text.clone()));
-        }
-    }
-}
-
-/// What the first reading found.
+/// What the reading of a file found.
 pub(super) struct Scan {
     pub label: String,
     pub lines: u64,
@@ -97,7 +61,7 @@ pub(super) struct Scan {
     pub times: Vec<(f64, u32)>,
     /// Usable data rows, for a join.
     pub usable: Vec<bool>,
-    pub packed: Option<PackedRows>,
+    pub held: HeldRows,
     pub slots: Vec<usize>,
     /// Revolute joints beyond one and a half turns.
     pub turns: FileOddities,
@@ -109,7 +73,7 @@ pub(super) struct Scan {
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
     /// Hash of what all its usable rows say, of a file with what was measured.
-    pub measured: Option<u128>,
+    pub measured: Option<u64>,
     /// Ids of the first usable rows with their data rows, for a join by id.
     pub first_ids: Vec<(u32, String)>,
 }
@@ -118,9 +82,9 @@ pub(super) struct Scan {
 const EXAMPLES: usize = 1000;
 
 impl Scan {
-    fn new(label: String, slots: Vec<usize>, packed: Option<PackedRows>) -> Self {
+    fn new(open: &OpenedFile, held: HeldRows) -> Self {
         Self {
-            label,
+            label: open.label.clone(),
             lines: 0,
             read: 0,
             last: 0,
@@ -128,14 +92,14 @@ impl Scan {
             ids: FileIds::default(),
             times: Vec::new(),
             usable: Vec::new(),
-            packed,
-            slots,
+            held,
+            slots: open.binding().slots(),
             turns: FileOddities::default(),
             beyond: FileOddities::default(),
             largest: 0.0,
             ranges: Vec::new(),
             track: None,
-            measured: None,
+            measured: open.binding().measures.then_some(0),
             first_ids: Vec::new(),
         }
     }
@@ -151,75 +115,63 @@ impl Scan {
     }
 }
 
-/// A file below its header, with its size in bytes where that is known.
-pub(super) struct ScannedFile {
-    reading: OpenedFile,
-    size: Option<u64>,
-}
-
-impl ScannedFile {
-    /// What is known before the first row.
-    pub(super) fn beginning(&self) -> Scan {
-        Scan::new(self.reading.label.clone(), self.reading.rows.binding().slots(), None)
+/// Reads the files of a measurement once, beside each other; each may hold rows of so many bytes in all.
+pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: &Context) -> Result<Vec<Scan>> {
+    let (mut opened, mut sizes) = (Vec::new(), Vec::new());
+    for layout in &settings.files {
+        let source = context.services.open(&layout.file)?;
+        sizes.push(source.size);
+        let open = OpenedFile::open(source, layout, arm, settings.limits)?;
+        open.remarks().iter().for_each(|remark| context.services.note(format!("{}: {remark}", open.label)));
+        opened.push(open);
     }
+    let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
+    let progress = FileProgress::begin(context, &format!("reading {}", labels.join(", ")), sizes.into_iter().sum(), "bytes");
+    let scans: Vec<Result<Scan>> = opened
+        .into_par_iter()
+        .enumerate()
+        .map(|(index, open)| file(settings, index, open, (arm, most), &progress, context))
+        .collect();
+    // Of several faults that of the first file.
+    scans.into_iter().collect()
 }
 
-/// Opens a file and says what is odd about it.
-pub(super) fn open(settings: &Ingest, layout: &FileLayout, arm: &Arc<RobotJoints>, context: &Context) -> Result<ScannedFile> {
-    let source = context.services.open(&layout.file)?;
-    let size = source.size;
-    let reading = OpenedFile::open(source, layout, arm, settings.limits)?;
-    external::must_stand(&reading, layout, arm, context)?;
-    for remark in reading.remarks() {
-        context.services.note(format!("{}: {remark}", reading.label));
-    }
-    Ok(ScannedFile { reading, size })
-}
-
-/// Whoever sees each row with what was judged of it.
-pub(super) type RowWatch<'a> = dyn FnMut(&OpenedFile, &Result<(), RowRefusal>) + 'a;
-
-/// Reads file `index` of the settings once.
-pub(super) fn scan(
+/// Reads file `index` of the settings.
+fn file(
     settings: &Ingest,
     index: usize,
-    ScannedFile { mut reading, size }: ScannedFile,
-    arm: &RobotJoints,
+    mut open: OpenedFile,
+    (arm, most): (&RobotJoints, usize),
+    progress: &FileProgress,
     context: &Context,
-    watch: &mut RowWatch,
 ) -> Result<Scan> {
     let layout = &settings.files[index];
-    let label = reading.label.clone();
-    context.services.begin(&format!("reading {label}"), size, "bytes");
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
-    let slots = reading.rows.binding().slots();
-    let packed = (joined && index > 0).then(|| PackedRows::of(&reading, layout, arm));
-    let mut scan = Scan::new(label, slots, packed);
-    scan.measured = reading.rows.binding().measures.then_some(0);
+    let held = HeldRows::new(open.binding(), joined && index > 0, most / settings.files.len());
+    let mut scan = Scan::new(&open, held);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
-    let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
-    let timed = matches!(settings.join, Some(Join::Time { .. }));
-    // By id, both rows have the same one.
-    let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    reading.rows.fingerprint(Fingerprints { ids: keyed, contents: keyed || scan.measured.is_some() });
-    let mut pace = ProgressCounter::new(context);
-    while let Some(judged) = reading.next()? {
-        let row = &reading.row;
+    let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
+    let (by_time, by_id) = (matches!(settings.join, Some(Join::Time { .. })), matches!(settings.join, Some(Join::Id {})));
+    let (mut hasher, mut pace) = (RowHasher::default(), progress.counter());
+    while let Some(judged) = open.next()? {
+        let row = &open.row;
         if let Some((joint, angle)) = row.turned {
             scan.turns.count(row.line, joint, angle);
         }
         match &judged {
             Ok(()) => {
+                let hashed = keyed || scan.measured.is_some();
+                let content = if hashed { hasher.of(row, &open.binding().filled) } else { 0 };
                 if keyed && !row.id.is_empty() {
-                    scan.ids.push(row, index, &scan.label)?;
+                    scan.ids.push(row, content, &scan.label)?;
                 }
-                if matches!(settings.join, Some(Join::Id {})) && scan.first_ids.len() < EXAMPLES {
+                if by_id && scan.first_ids.len() < EXAMPLES {
                     scan.first_ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
                 }
                 if let Some(before) = &mut scan.measured {
-                    *before = behind(*before, row.number, row.content);
+                    *before = behind(*before, row.number, content);
                 }
-                if timed {
+                if by_time {
                     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
                     scan.times.push((time, narrow(row.number, &scan.label)?));
                 }
@@ -233,18 +185,15 @@ pub(super) fn scan(
         if joined {
             scan.usable.push(judged.is_ok());
         }
-        if let Some(packed) = &mut scan.packed {
-            packed.push(row, named);
-        }
-        if !reading.row.is_blank {
+        if !row.is_blank {
             scan.last = row.number;
         }
-        watch(&reading, &judged);
-        pace.row(reading.rows.bytes());
+        scan.held.push(&open, &judged);
+        pace.row(open.bytes());
     }
-    context.services.advance(reading.rows.bytes(), "");
-    scan.lines = reading.rows.lines();
-    scan.read = reading.row.number;
+    pace.tell(open.bytes());
+    open.external.must_stand(&open.label, arm.joints())?;
+    (scan.lines, scan.read) = (open.lines(), open.row.number);
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
     }
@@ -252,6 +201,20 @@ pub(super) fn scan(
         scan.track = Some(samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context)?);
     }
     Ok(scan)
+}
+
+/// The rows of a file once more.
+pub(super) fn rows<'a>(
+    scan: &'a Scan,
+    (settings, layout): (&Ingest, &FileLayout),
+    arm: &'a RobotJoints,
+    context: &Context,
+) -> Result<RowSource<'a>> {
+    if let Some(held) = scan.held.rows(RecordedRow::empty(arm)) {
+        return Ok(RowSource::Held(held));
+    }
+    let source = context.services.open(&layout.file)?;
+    Ok(RowSource::File(Box::new(OpenedFile::open(source, layout, arm, settings.limits)?)))
 }
 
 /// Whether velocities, or what they change by, follow from this file's joints over time.

@@ -6,7 +6,7 @@ use super::arm::RobotJoints;
 use super::channel::TorqueChannel;
 use super::check;
 use super::layout::{FileLayout, LimitPolicy};
-use super::reading::{self, OpenedFile, ProgressCounter};
+use super::reading::{self, FileProgress, OpenedFile};
 use super::recorded::RecordedRow;
 use super::refusal::{Reason, RowRefusal};
 use super::rejections::Rejections;
@@ -17,7 +17,6 @@ use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, RejectedRow, Robot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Reads recordings of joint torques or motor currents of a moving arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -112,7 +111,7 @@ impl Stage for IngestTorques {
     }
 
     fn look(&self, reads: Option<IngestTorquesReads>, context: &Context) -> Result<Option<IngestTorquesWrites>> {
-        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?.map(Arc::new);
+        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?;
         let mut faults = Vec::new();
         for layout in &self.files {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -128,7 +127,7 @@ impl Stage for IngestTorques {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        let arm = Arc::new(RobotJoints::of(&reads.robot)?);
+        let arm = RobotJoints::of(&reads.robot)?;
         let labels: Vec<String> = self.files.iter().map(|file| file.file.0.display().to_string()).collect();
         let names = super::names(labels.iter().map(String::as_str));
         let mut rejected = Rejections::new(&names, context)?;
@@ -145,7 +144,7 @@ impl Stage for IngestTorques {
 /// The table of motion, chunk by chunk.
 struct MotionRows<'a> {
     settings: &'a IngestTorques,
-    arm: &'a Arc<RobotJoints>,
+    arm: &'a RobotJoints,
     sink: Box<dyn Sink + 'a>,
     chunk: ArmMotion,
     written: i64,
@@ -161,7 +160,7 @@ struct MotionRows<'a> {
 }
 
 impl<'a> MotionRows<'a> {
-    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a Arc<RobotJoints>, context: &Context<'a>) -> Result<Self> {
+    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a RobotJoints, context: &Context<'a>) -> Result<Self> {
         let joints = robot.0.iter().filter(|row| row.kind == "revolute" || row.kind == "prismatic");
         let ratio = joints.map(|row| match (settings.torque_side, row.reduction_ratio) {
             (TorqueSide::Joint, _) => Ok(1.0),
@@ -193,14 +192,14 @@ impl<'a> MotionRows<'a> {
         let size = source.size;
         let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
         let label = open.label.clone();
-        context.services.begin(&format!("reading {label}"), size, "bytes");
+        let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
-        let given = open.rows.binding().slots();
+        let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let optional = [has("velocity"), has("temperature")];
         self.agree(optional, &label)?;
         self.stretches.begin();
-        let (mut pace, mut refused) = (ProgressCounter::new(context), RefusalCounts::new());
+        let (mut pace, mut refused) = (progress.counter(), RefusalCounts::new());
         let mut accepted = 0u64;
         while let Some(judged) = open.next()? {
             match judged.and_then(|()| self.complete(&open.row)) {
@@ -213,14 +212,14 @@ impl<'a> MotionRows<'a> {
                     rejected.push(RejectedRow { point_id: None, ..open.rejected(name, refusal) })?;
                 }
             }
-            pace.row(open.rows.bytes());
+            pace.row(open.bytes());
         }
         let read = open.row.number;
         self.few_rejected(&label, read, accepted, &refused)?;
         context.services.note(format!("{name}: {} read, {accepted} used, {} rejected", counted(read, "row"), read - accepted));
         Ok(IntakeRow {
             file: name.into(),
-            lines: open.rows.lines() as i64,
+            lines: open.lines() as i64,
             read: read as i64,
             accepted: accepted as i64,
             rejected: (read - accepted) as i64,
@@ -229,7 +228,7 @@ impl<'a> MotionRows<'a> {
 
     /// Which of currents and torques a file has: one of them, and the same in each file.
     fn signal_of(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
-        let given = open.rows.binding().slots();
+        let given = open.binding().slots();
         let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
         let own = match (has("torque"), has("current")) {
             (true, false) => "torque",
@@ -238,7 +237,7 @@ impl<'a> MotionRows<'a> {
                 return Err(Error::data(label, "has torques and currents; map one of them: the other would not be used"));
             }
             (false, false) => {
-                let lacks = open.rows.binding().missing.join("; ");
+                let lacks = open.binding().missing.join("; ");
                 return Err(Error::data(label, format!("has neither torques nor motor currents of the joints: {lacks}")));
             }
         };

@@ -1,14 +1,14 @@
-//! Second reading: the recording in chunks, and every row that is not part of it with its reason.
+//! The recording in chunks, and every row that is not part of it with its reason.
 
 use super::joined::JoinDecisions;
 use super::later::Continuation;
 use super::layout::FileLayout;
 use super::noise::NoiseSlots;
 use super::pair::FileDecision;
-use super::reading::{OpenedFile, ProgressCounter};
+use super::reading::FileProgress;
 use super::recorded::RecordedRow;
 use super::rejections::Rejections;
-use super::verdict;
+use super::{scan, verdict};
 use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
 use crate::robot::{START, SigmaSource};
@@ -29,24 +29,24 @@ pub(super) fn write(
 ) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
     let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.decisions).take(one.leading()));
     let rows = rows.map(|(scan, decision)| verdict::accepted(scan, decision)).sum();
-    context.services.begin("writing the recording", Some(rows), "rows");
+    let progress = FileProgress::begin(context, "writing the recording", Some(rows), "rows");
     let mut recording = RecordingChunks::new(decided, context)?;
     let mut rejected = Rejections::new(names, context)?;
     for (one, gap) in decided.iter().zip(std::iter::once(None).chain(gaps.iter().map(Some))) {
         gap.into_iter().for_each(|gap| recording.rows.begin(*gap));
         for (index, layout) in one.settings.files.iter().enumerate() {
-            file(one, index, layout, (index < one.leading()).then_some(&mut recording), &mut rejected, context)?;
+            file(one, index, layout, (index < one.leading()).then_some((&mut recording, &progress)), &mut rejected, context)?;
         }
     }
     Ok((recording.finish(context)?, rejected.finish()?))
 }
 
-/// Reads file `index` once more: rejected rows of it, and used ones where `recording` takes them.
-pub(super) fn file(
+/// Rows of file `index`: rejected ones, and used ones where the recording takes them.
+fn file(
     decided: &JoinDecisions,
     index: usize,
     layout: &FileLayout,
-    mut recording: Option<&mut RecordingChunks>,
+    mut recording: Option<(&mut RecordingChunks, &FileProgress)>,
     rejected: &mut Rejections,
     context: &Context,
 ) -> Result<()> {
@@ -55,26 +55,30 @@ pub(super) fn file(
     else {
         return Err(Error::Bug(format!("file {index} was not scanned")));
     };
-    let source = context.services.open(&layout.file)?;
-    let mut reading = OpenedFile::open(source, layout, decided.arm, decided.settings.limits)?;
-    let mut pace = ProgressCounter::new(context);
+    let used = verdict::accepted(scan, decision);
+    if recording.is_none() && used == scan.read {
+        return Ok(());
+    }
+    let mut rows = scan::rows(scan, (decided.settings, layout), decided.arm, context)?;
+    let mut pace = recording.as_ref().map(|(_, progress)| progress.counter());
     let mut accepted = 0;
-    while let Some(judged) = reading.next()? {
-        match judged.and_then(|()| decided.outcome(index, decision, &reading.row)) {
+    while let Some(judged) = rows.next()? {
+        match judged.and_then(|()| decided.outcome(index, decision, rows.row())) {
             Ok(()) => {
                 accepted += 1;
-                if let Some(chunks) = &mut recording {
-                    chunks.push(&reading.row, index, decision, decided)?;
+                if let (Some((chunks, _)), Some(pace)) = (&mut recording, &mut pace) {
+                    chunks.push(rows.row(), index, decision, decided)?;
                     pace.row(chunks.written);
                 }
             }
-            Err(refusal) => rejected.push(reading.rejected(name, refusal))?,
+            Err(refusal) => rejected.push(rows.row().rejected(name, rows.text(), refusal))?,
         }
     }
-    if let Some(chunks) = recording {
-        chunks.before += reading.row.number;
+    let read = rows.row().number;
+    if let Some((chunks, _)) = recording {
+        chunks.before += read;
     }
-    if (reading.row.number, accepted) != (scan.read, verdict::accepted(scan, decision)) {
+    if (read, accepted) != (scan.read, used) {
         return Err(Error::data(&scan.label, "changed while it was read; run again"));
     }
     Ok(())
@@ -90,7 +94,7 @@ struct Stored {
 }
 
 /// The recording, chunk by chunk.
-pub(super) struct RecordingChunks<'a> {
+struct RecordingChunks<'a> {
     sink: Box<dyn Sink + 'a>,
     sequence: Vec<i64>,
     ids: TextCells,
@@ -110,13 +114,13 @@ pub(super) struct RecordingChunks<'a> {
     rows: Continuation,
     written: u64,
     /// Data rows of the files before this one.
-    pub before: u64,
+    before: u64,
     /// The most targets of a wide row; 1 where there is none.
     widest: i64,
 }
 
 impl<'a> RecordingChunks<'a> {
-    pub(super) fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
+    fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
         let [decided, ..] = all else { return Err(Error::Bug("nothing was read".into())) };
         let slots = &decided.arm.slots;
         let mut has = vec![false; slots.count];
@@ -172,28 +176,24 @@ impl<'a> RecordingChunks<'a> {
                 .unwrap_or(1),
         })
     }
-    pub(super) fn push(
-        &mut self,
-        row: &RecordedRow,
-        index: usize,
-        decision: &FileDecision,
-        decided: &JoinDecisions,
-    ) -> Result<()> {
+    fn push(&mut self, row: &RecordedRow, index: usize, decision: &FileDecision, decided: &JoinDecisions) -> Result<()> {
         self.merged.clone_from(&row.values);
-        for (at, packed) in decided.partners(row, decision) {
-            let width = packed.slots.len();
-            let values = packed.values.get(at * width..(at + 1) * width).unwrap_or_default();
-            for (slot, value) in packed.slots.iter().zip(values) {
+        for (at, held) in decided.partners(row, decision) {
+            let width = held.places.len();
+            let values = held.values.get(at * width..(at + 1) * width).unwrap_or_default();
+            for (slot, value) in held.places.iter().zip(values) {
                 // Mapped in both files, for a join by time: the time of a row is that of the file that leads.
                 if let Some(merged) = self.merged.get_mut(*slot).filter(|merged| merged.is_nan()) {
                     *merged = *value;
                 }
             }
         }
-        let id = decided.partners(row, decision).filter_map(|(at, packed)| packed.ids.get(at)).last().unwrap_or(&row.id);
+        // By id, both rows have the same one.
+        let ids = decided.partners(row, decision).filter_map(|(at, held)| held.ids.get(at).filter(|id| !id.is_empty()));
+        let id = ids.last().unwrap_or(&row.id);
         let text = |place: usize| {
-            let others = decided.partners(row, decision).filter_map(|(at, packed)| packed.texts.get(place)?.as_ref()?.get(at));
-            others.last().or(row.texts.get(place)).map_or("", String::as_str)
+            let others = decided.partners(row, decision).filter_map(|(at, held)| held.text(place, at));
+            others.last().or(row.texts.get(place).map(String::as_str)).unwrap_or_default()
         };
         self.carry(decided, index, row, decision);
         let number = self.before + row.number;
@@ -283,7 +283,7 @@ impl<'a> RecordingChunks<'a> {
         let frame = recording_frame(std::mem::take(&mut self.sequence), self.ids.take(), texts, numbers)?;
         self.sink.push(frame)
     }
-    pub(super) fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
+    fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
         if !self.sequence.is_empty() {
             self.flush()?;
         }

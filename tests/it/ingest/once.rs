@@ -1,7 +1,9 @@
-//! How often files are read, and that the tables do not depend on it.
+//! Files that fit into memory are read once, whatever becomes of their rows.
 
-use super::{HEAD, TWO, Taken, good, robot, take};
+use super::{HEAD, TWO, Taken, good, robot, settings, take, taken};
 use crate::desk::Desk;
+use calib::stage::Writes;
+use calib::stage::ingest::{IngestReads, IngestWrites};
 
 const JOINED: &str = r#"
 files:
@@ -48,20 +50,39 @@ fn rows_that_are_used_as_they_come_are_read_once() {
 }
 
 #[test]
-fn a_file_is_read_again_where_rows_of_it_turn_out_to_have_no_partner() {
+fn rows_that_turn_out_to_have_no_partner_are_not_read_again() {
     let (taken, opened) = read("A,1\nB,2\n", "A,1,1,1\nX,2,2,2\nB,3,3,3\n", JOINED);
-    assert_eq!(opened, [1, 2]);
+    assert_eq!(opened, [1, 1]);
     assert_eq!(taken.recording.point_id, ["A", "B"]);
     assert_eq!(refused(&taken), [("tracker.csv", 3, "unmatched")]);
     assert_eq!(taken.rejected.0[0].text, "X,2,2,2");
 }
 
 #[test]
-fn an_id_that_stands_twice_takes_back_what_was_written() {
+fn an_id_that_stands_twice_is_known_before_anything_is_written() {
     let yaml = format!("{JOINED}max_rejected_fraction: 0.9\n");
     let (taken, opened) = read("A,1\nB,2\nA,3\n", "A,1,1,1\nB,3,3,3\n", &yaml);
-    assert_eq!(opened, [2, 2]);
+    assert_eq!(opened, [1, 1]);
     assert_eq!(taken.recording.point_id, ["B"]);
     let places = [("arm.csv", 2, "duplicate_id"), ("arm.csv", 4, "duplicate_id"), ("tracker.csv", 2, "unmatched")];
     assert_eq!(refused(&taken), places);
+}
+
+#[test]
+fn files_that_do_not_fit_into_memory_are_read_twice_and_give_the_same_tables() {
+    let (arm, tracker) = ("A,1\nB,2\nA,3\nC,bad\nD,4\nE,5\n", "E,5,5,5\nX,1,1,1\nB,3,3,3\nD,4,4,4\n");
+    let yaml = format!("{JOINED}max_rejected_fraction: 0.9\n");
+    for (tracker, times) in [(tracker, [2, 2]), (&tracker.replace("X,1,1,1\n", ""), [2, 1])] {
+        let (held, opened) = read(arm, tracker, &yaml);
+        assert_eq!(opened, [1, 1]);
+        let desk = Desk::default().with("arm.csv", format!("k,q1\n{arm}")).with("tracker.csv", format!("k,x,y,z\n{tracker}"));
+        let reads = IngestReads { robot: robot("r", 2.0) };
+        let tables = desk.written(&IngestWrites::ports(), |context| settings(&yaml).run_holding(0, reads, context)?.give());
+        let again = taken(tables.unwrap()).unwrap();
+        let opened = desk.opened.lock().unwrap().clone();
+        assert_eq!(["arm.csv", "tracker.csv"].map(|name| opened.iter().filter(|file| *file == name).count()), times);
+        assert_eq!(again.recording, held.recording);
+        assert_eq!(again.rejected, held.rejected);
+        assert_eq!(again.recording.point_id, ["B", "D", "E"]);
+    }
 }

@@ -1,0 +1,230 @@
+//! Files of columns (Parquet, Feather) as the same records that text gives; they are held in memory.
+//!
+//! Cells become text: a number of 64 bits comes back the same, and there is one way of judging rows. A list of numbers, as learning data
+//! sets hold them, is a column for each: `state[1]`, `state[2]`, and so on.
+
+use super::record::{Record, RecordReader, failed};
+use super::{decoded, parquet};
+use crate::error::{Error, Result};
+use arrow::array::{Array, ArrayRef, AsArray, Int64Array, RecordBatch};
+use arrow::compute::take;
+use arrow::datatypes::{DataType, Field, FieldRef, Schema, SchemaRef};
+use arrow::error::ArrowError;
+use arrow::util::display::{ArrayFormatter, FormatOptions};
+use arrow_ipc::reader::FileReader;
+use std::fmt::{Display, Write};
+use std::io::{Cursor, Read};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Rows held as text at a time.
+const HELD: usize = 1 << 10;
+/// Numbers of a list, at most: a longer one is a picture or a sound.
+const LONGEST: usize = 256;
+/// How Parquet begins, and Feather of version 1 and of version 2.
+const PARQUET: &[u8] = b"PAR1";
+const FEATHER: [&[u8]; 2] = [b"FEA1", b"ARROW1"];
+
+type Batches = Box<dyn Iterator<Item = std::result::Result<RecordBatch, String>> + Send>;
+
+/// Whether a file that begins so is one of columns.
+pub fn has_columns(head: &[u8]) -> bool {
+    [PARQUET, FEATHER[0], FEATHER[1]].iter().any(|mark| head.starts_with(mark))
+}
+
+/// Reads one file from its names to its last row.
+pub struct ColumnRows {
+    label: String,
+    /// E.g. `a Parquet file`.
+    what: &'static str,
+    schema: SchemaRef,
+    batches: Batches,
+    /// Bytes of the file, and its rows where it says so.
+    size: u64,
+    all: Option<u64>,
+    is_named: bool,
+    batch: Option<RecordBatch>,
+    /// The cells of some rows, column by column.
+    text: String,
+    cells: Vec<Range<usize>>,
+    /// How many rows `cells` holds, and the next of them.
+    held: usize,
+    next: usize,
+    rows: u64,
+}
+
+impl ColumnRows {
+    /// Opens a file; fails where it cannot be read.
+    pub fn open(mut source: impl Read, label: &str) -> Result<Self> {
+        let mut content = Vec::new();
+        source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
+        let size = content.len() as u64;
+        let (what, opened) = if content.starts_with(PARQUET) {
+            let file = parquet(bytes::Bytes::from(content), HELD);
+            ("a Parquet file", file.map(|file| (file.schema.clone(), Some(file.rows), Box::new(file) as Batches)))
+        } else if content.starts_with(FEATHER[0]) {
+            let message =
+                "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
+            return Err(Error::data(label, message));
+        } else {
+            ("a Feather file", feather(content))
+        };
+        let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
+        let (schema, batches) = unfolded(schema, batches);
+        let label = label.into();
+        let (text, cells) = (String::new(), Vec::new());
+        Ok(Self { label, what, schema, batches, size, all, is_named: false, batch: None, text, cells, held: 0, next: 0, rows: 0 })
+    }
+    /// Makes text of the next rows; false at the end.
+    fn refill(&mut self) -> Result<bool> {
+        let broken = |error: &dyn Display| broken(&self.label, self.what, error);
+        let batch = match self.batch.take() {
+            Some(batch) => batch,
+            None => match self.batches.next() {
+                Some(batch) => batch.map_err(|error| broken(&error))?,
+                None => return Ok(false),
+            },
+        };
+        (self.held, self.next) = (batch.num_rows().min(HELD), 0);
+        self.text.clear();
+        self.cells.clear();
+        for column in batch.columns() {
+            let cells = ArrayFormatter::try_new(column, &FormatOptions::default()).map_err(|error| broken(&error))?;
+            for row in 0..self.held {
+                let start = self.text.len();
+                write!(self.text, "{}", cells.value(row)).map_err(|error| broken(&error))?;
+                self.cells.push(start..self.text.len());
+            }
+        }
+        let left = batch.num_rows() - self.held;
+        self.batch = (left > 0).then(|| batch.slice(self.held, left));
+        Ok(true)
+    }
+}
+
+impl RecordReader for ColumnRows {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
+        record.begin(self.rows);
+        if !std::mem::replace(&mut self.is_named, true) {
+            self.schema.fields().iter().for_each(|field| record.push(field.name().as_bytes()));
+            return Ok(true);
+        }
+        while self.next == self.held {
+            if !self.refill()? {
+                return Ok(false);
+            }
+        }
+        self.rows += 1;
+        record.begin(self.rows);
+        let own = self.cells.iter().skip(self.next).step_by(self.held);
+        own.for_each(|cell| record.push(self.text[cell.clone()].as_bytes()));
+        self.next += 1;
+        Ok(true)
+    }
+    fn lines(&self) -> u64 {
+        self.rows
+    }
+    /// Progress as a part of the file.
+    fn bytes(&self) -> u64 {
+        let all = self.all.unwrap_or_default().max(1);
+        (u128::from(self.size) * u128::from(self.rows.min(all)) / u128::from(all)) as u64
+    }
+}
+
+/// The fault of a file whose decoder gives up.
+fn broken(label: &str, what: &str, error: impl Display) -> Error {
+    Error::data(label, format!("is {what} that cannot be read: {error}"))
+}
+
+/// A Feather file: columns of Arrow as they stand in memory, as pandas, polars and R write them; uncompressed or by zstd.
+fn feather(content: Vec<u8>) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String> {
+    let mut file = decoded(|| FileReader::try_new(Cursor::new(content), None).map_err(|error| error.to_string()))??;
+    let schema = file.schema();
+    // A decoder that gave up is not asked again.
+    let mut whole = true;
+    let batches = std::iter::from_fn(move || {
+        let next = if whole { decoded(|| file.next()) } else { Ok(None) };
+        let batch =
+            next.map_or_else(|message| Some(Err(message)), |batch| batch.map(|batch| batch.map_err(|error| said(&error))));
+        whole = matches!(batch, Some(Ok(_)));
+        batch
+    });
+    Ok((schema, None, Box::new(batches)))
+}
+
+/// What the decoder says, and what to do where the file is compressed in a way that it does not know.
+fn said(error: &ArrowError) -> String {
+    let text = error.to_string();
+    if text.contains("lz4") {
+        return "its columns are compressed by LZ4; allowed: none or zstd, e.g. `to_feather(FILE, compression=\"zstd\")`".into();
+    }
+    text
+}
+
+/// The same with lists of numbers as columns, as many as the longest list of the first rows has; a shorter list has blank cells.
+fn unfolded(schema: SchemaRef, mut batches: Batches) -> (SchemaRef, Batches) {
+    let fields = schema.fields();
+    if fields.iter().all(|field| number_of_list(field).is_none()) {
+        return (schema, batches);
+    }
+    let first = batches.next();
+    let longest = |column: usize| {
+        let rows = first.as_ref().and_then(|batch| batch.as_ref().ok());
+        rows.map_or(0, |batch| lists(batch.column(column)).1.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0))
+    };
+    let width = |column: usize| Some(longest(column)).filter(|width| (1..=LONGEST).contains(width));
+    let widths: Vec<Option<usize>> = (0..fields.len()).map(|k| number_of_list(&fields[k]).and_then(|_| width(k))).collect();
+    let columns = fields.iter().zip(&widths).flat_map(|(field, width)| match (number_of_list(field), width) {
+        (Some(number), Some(width)) => {
+            (1..=*width).map(|k| Arc::new(Field::new(format!("{}[{k}]", field.name()), number.clone(), true))).collect()
+        }
+        _ => vec![field.clone()],
+    });
+    let schema = Arc::new(Schema::new(columns.collect::<Vec<FieldRef>>()));
+    let (rows, own) = (first.into_iter().chain(batches), schema.clone());
+    let batches = rows.map(move |batch| {
+        let columns = batch?
+            .columns()
+            .iter()
+            .zip(&widths)
+            .map(|(column, width)| cells(column, *width))
+            .collect::<std::result::Result<Vec<_>, _>>();
+        columns.and_then(|columns| RecordBatch::try_new(own.clone(), columns.concat())).map_err(|error| error.to_string())
+    });
+    (schema, Box::new(batches))
+}
+
+/// What kind of numbers the lists of a column hold; none where it holds none.
+fn number_of_list(field: &Field) -> Option<&DataType> {
+    match field.data_type() {
+        DataType::List(of) | DataType::LargeList(of) | DataType::FixedSizeList(of, _) => Some(of.data_type()),
+        _ => None,
+    }
+    .filter(|of| of.is_numeric())
+}
+
+/// The numbers of all lists of a column, and where each list begins among them, with the end of the last.
+fn lists(column: &ArrayRef) -> (&ArrayRef, Vec<usize>) {
+    if let Some(list) = column.as_list_opt::<i32>() {
+        return (list.values(), list.value_offsets().iter().map(|at| *at as usize).collect());
+    }
+    if let Some(list) = column.as_list_opt::<i64>() {
+        return (list.values(), list.value_offsets().iter().map(|at| *at as usize).collect());
+    }
+    let list = column.as_fixed_size_list();
+    (list.values(), (0..=list.len()).map(|row| row * list.value_length() as usize).collect())
+}
+
+/// A column as it is, or so many columns of the numbers of its lists.
+fn cells(column: &ArrayRef, width: Option<usize>) -> std::result::Result<Vec<ArrayRef>, ArrowError> {
+    let Some(width) = width else { return Ok(vec![column.clone()]) };
+    let (values, starts) = lists(column);
+    let number = |k: usize| {
+        let at = |row: usize| (starts[row] + k < starts[row + 1] && !column.is_null(row)).then_some((starts[row] + k) as i64);
+        take(values, &(0..column.len()).map(at).collect::<Int64Array>(), None)
+    };
+    (0..width).map(number).collect()
+}

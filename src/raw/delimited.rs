@@ -1,0 +1,387 @@
+//! Rows of delimited text as they stand: exact line numbers, quoted fields, bounded memory.
+//!
+//! A quoted field may hold the delimiter, line ends and `""` for a quote; blanks may stand before its quote. Empty lines and comments are no
+//! rows. The crate `csv` is not used: it has neither runs of blanks as a delimiter, nor comments of two letters, nor a longest row.
+
+use super::record::{Record, RecordReader, failed};
+use super::shown;
+use crate::error::{Error, Result};
+use memchr::{memchr, memchr2_iter};
+use std::borrow::Cow;
+use std::io::{BufRead, Read};
+use std::ops::Range;
+
+/// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
+const LONGEST: usize = 1 << 20;
+
+/// What separates fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// This byte.
+    Byte(u8),
+    /// Any run of blanks and tabs.
+    Whitespace,
+}
+
+impl Delimiter {
+    /// The delimiter that a person wrote, or `None` for what is not allowed.
+    pub fn parse(text: &str) -> Option<Self> {
+        match (text, text.as_bytes()) {
+            ("tab", _) => Some(Self::Byte(b'\t')),
+            ("whitespace", _) => Some(Self::Whitespace),
+            (_, [byte])
+                if byte.is_ascii()
+                    && !byte.is_ascii_alphanumeric()
+                    && !matches!(byte, b'"' | b'\n' | b'\r' | b'.' | b'-' | b'+') =>
+            {
+                Some(Self::Byte(*byte))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A row that is taken apart, as far as it was read.
+#[derive(Debug, Clone, Copy, Default)]
+struct Splitter {
+    /// Bytes that were read.
+    seen: usize,
+    /// Where the present field begins.
+    start: usize,
+    /// Where the quote stands that opened it and was not closed yet.
+    open: Option<usize>,
+    /// Whether a field has quotes around it.
+    has_quoted: bool,
+}
+
+impl Splitter {
+    /// Places of the fields of a row with their quotes and the blanks around them. Where a quote is left open, the last field is missing until
+    /// more of the row is there.
+    fn split(&mut self, text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) {
+        let from = self.seen;
+        self.seen = text.len();
+        match delimiter {
+            Delimiter::Byte(byte) => {
+                let mut next = from;
+                for at in memchr2_iter(byte, b'"', &text[from..]).map(|at| from + at) {
+                    if at < next {
+                        continue;
+                    }
+                    if text[at] == byte {
+                        if self.open.is_none() {
+                            fields.push(self.start..at);
+                            self.start = at + 1;
+                        }
+                    } else if self.quote(text, at) {
+                        next = at + 2;
+                    }
+                }
+                if self.open.is_none() {
+                    fields.push(self.start..text.len());
+                }
+            }
+            Delimiter::Whitespace => {
+                let (mut inside, mut next) = (from > 0, from);
+                for (at, byte) in text.iter().enumerate().skip(from) {
+                    let is_blank = matches!(byte, b' ' | b'\t');
+                    if at < next || self.open.is_some() && *byte != b'"' {
+                        continue;
+                    }
+                    if inside && is_blank {
+                        fields.push(self.start..at);
+                        (inside, self.start) = (false, at + 1);
+                    } else if !inside && !is_blank {
+                        (inside, self.start) = (true, at);
+                    }
+                    if *byte == b'"' && self.quote(text, at) {
+                        next = at + 2;
+                    }
+                }
+                if inside && self.open.is_none() {
+                    fields.push(self.start..text.len());
+                }
+            }
+        }
+    }
+
+    /// Reads a quote; whether it and the next one are one that is part of the text.
+    fn quote(&mut self, text: &[u8], at: usize) -> bool {
+        if self.open.is_some() {
+            if text.get(at + 1) == Some(&b'"') {
+                return true;
+            }
+            self.open = None;
+        } else if text[self.start..at].trim_ascii().is_empty() {
+            (self.open, self.has_quoted) = (Some(at), true);
+        }
+        false
+    }
+}
+
+/// Places of the fields of a line with their quotes and the blanks around them. Where a quote is left open, its place, and the last field
+/// reaches to the end.
+pub fn fields(line: &str, delimiter: Delimiter) -> (Vec<Range<usize>>, Option<usize>) {
+    let (mut fields, mut splitter) = (Vec::with_capacity(16), Splitter::default());
+    splitter.split(line.as_bytes(), delimiter, &mut fields);
+    if splitter.open.is_some() {
+        fields.push(splitter.start..line.len());
+    }
+    (fields, splitter.open)
+}
+
+/// A field without the blanks and the quotes around it, and with one quote for two inside.
+pub fn unquoted_text(field: &str) -> Cow<'_, str> {
+    match unquoted(field.trim().as_bytes()) {
+        Cow::Borrowed(bytes) => String::from_utf8_lossy(bytes),
+        Cow::Owned(bytes) => String::from_utf8_lossy(&bytes).into_owned().into(),
+    }
+}
+
+/// The same of bytes.
+fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
+    let field = field.trim_ascii();
+    let Some(inner) = field.strip_prefix(b"\"") else { return Cow::Borrowed(field) };
+    if let Some((b'"', inner)) = inner.split_last()
+        && memchr(b'"', inner).is_none()
+    {
+        return Cow::Borrowed(inner);
+    }
+    let (mut text, mut inside) = (Vec::with_capacity(inner.len()), true);
+    let mut bytes = inner.iter().copied().peekable();
+    while let Some(byte) = bytes.next() {
+        if inside && byte == b'"' && bytes.next_if_eq(&b'"').is_none() {
+            // What stands behind a closed quote is text.
+            inside = false;
+        } else {
+            text.push(byte);
+        }
+    }
+    Cow::Owned(text)
+}
+
+/// How a delimited text is written.
+#[derive(Debug, Clone)]
+pub struct TextLayout {
+    /// What separates fields.
+    pub delimiter: Delimiter,
+    /// How lines begin that are no rows.
+    pub comment: Option<String>,
+    /// The first row is the header, and a comment.
+    pub header_in_comment: bool,
+    /// Lines above the first row.
+    pub skip: u64,
+}
+
+/// Reads one text from its first line to its last.
+pub struct TextRows<R> {
+    reader: R,
+    label: String,
+    layout: TextLayout,
+    /// Physical lines read so far.
+    lines: u64,
+    bytes: u64,
+}
+
+impl<R: BufRead> TextRows<R> {
+    /// Opens a text without a byte-order mark and skips what stands above header and data.
+    pub fn open(mut reader: R, label: &str, layout: TextLayout) -> Result<Self> {
+        let head = reader.fill_buf().map_err(|error| failed(label, &error))?;
+        // Old Macintosh; one at the end may be a CRLF that was cut.
+        let lone = head.iter().position(|byte| *byte == b'\r').is_some_and(|at| at + 1 < head.len());
+        if lone && !head.contains(&b'\n') {
+            let message = format!(
+                "the lines end in CR alone; allowed: LF or CRLF. Save it again with such line ends, or convert it: \
+                 `tr '\\r' '\\n' < {label} > converted.csv`"
+            );
+            return Err(Error::data(label, message));
+        }
+        let skip = layout.skip;
+        let mut rows = Self { reader, label: label.into(), layout, lines: 0, bytes: 0 };
+        rows.pass(skip)?;
+        Ok(rows)
+    }
+    /// Passes over physical lines.
+    fn pass(&mut self, count: u64) -> Result<()> {
+        let mut text = Vec::new();
+        for _ in 0..count {
+            text.clear();
+            if !self.line(&mut text)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+    /// Appends one physical line without its end; false at the end of the file.
+    fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
+        let room = LONGEST.saturating_sub(text.len()) as u64;
+        let read = (&mut self.reader).take(room).read_until(b'\n', text).map_err(|error| failed(&self.label, &error))?;
+        if read == 0 && room > 0 {
+            return Ok(false);
+        }
+        self.bytes += read as u64;
+        self.lines += 1;
+        if room > 0 && text.last() == Some(&b'\n') {
+            text.pop();
+        } else if read as u64 == room {
+            let message = "a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed";
+            return Err(Error::data(format!("{}:{}", self.label, self.lines), message));
+        }
+        if text.last() == Some(&b'\r') {
+            text.pop();
+        }
+        Ok(true)
+    }
+    /// Takes the mark of a comment off the header.
+    fn uncomment(&mut self, record: &mut Record) -> Result<()> {
+        if !self.layout.header_in_comment || record.text.trim_ascii().is_empty() {
+            return Ok(());
+        }
+        self.layout.header_in_comment = false;
+        let mark = self.layout.comment.as_deref().unwrap_or_default().as_bytes();
+        if !record.text.starts_with(mark) {
+            let place = format!("{}:{}", self.label, self.lines);
+            let mark = shown(mark);
+            let message = format!("the header does not begin with `{mark}`; allowed: so, or `header_in_comment: false`");
+            return Err(Error::data(place, message));
+        }
+        record.text.drain(..mark.len());
+        Ok(())
+    }
+    /// Whether a line is no row.
+    fn is_passed_over(&self, line: &[u8]) -> bool {
+        let is_comment = self.layout.comment.as_ref().is_some_and(|mark| line.starts_with(mark.as_bytes()));
+        // A line of delimiters alone is a blank row, also where the delimiter is a tab.
+        let delimited = || matches!(self.layout.delimiter, Delimiter::Byte(byte) if byte != b' ' && line.contains(&byte));
+        is_comment || (line.trim_ascii().is_empty() && !delimited())
+    }
+}
+
+impl<R: BufRead + Send> RecordReader for TextRows<R> {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
+        loop {
+            record.text.clear();
+            if !self.line(&mut record.text)? {
+                return Ok(false);
+            }
+            record.line = self.lines;
+            self.uncomment(record)?;
+            if !self.is_passed_over(&record.text) {
+                break;
+            }
+        }
+        record.fields.clear();
+        let mut splitter = Splitter::default();
+        splitter.split(&record.text, self.layout.delimiter, &mut record.fields);
+        while splitter.open.is_some() {
+            record.text.push(b'\n');
+            if !self.line(&mut record.text)? {
+                return Err(Error::data(format!("{}:{}", self.label, record.line), "a quoted field is not closed"));
+            }
+            splitter.split(&record.text, self.layout.delimiter, &mut record.fields);
+        }
+        record.is_quoted = splitter.has_quoted;
+        if record.is_quoted {
+            record.unquoted.clear();
+            for place in &mut record.fields {
+                let start = record.unquoted.len();
+                record.unquoted.extend_from_slice(&unquoted(&record.text[place.clone()]));
+                *place = start..record.unquoted.len();
+            }
+        }
+        Ok(true)
+    }
+    fn lines(&self) -> u64 {
+        self.lines
+    }
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+    fn is_text(&self) -> bool {
+        true
+    }
+    fn skip(&mut self, lines: u64) -> Result<()> {
+        self.pass(lines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    fn opened(text: &[u8], delimiter: &str, comment: Option<&str>) -> TextRows<Cursor<Vec<u8>>> {
+        let delimiter = Delimiter::parse(delimiter).unwrap();
+        let layout = TextLayout { delimiter, comment: comment.map(Into::into), header_in_comment: false, skip: 0 };
+        TextRows::open(Cursor::new(text.to_vec()), "a.csv", layout).unwrap()
+    }
+
+    type Rows = Vec<(u64, Vec<String>)>;
+
+    fn all(reader: &mut dyn RecordReader) -> Result<Rows> {
+        let (mut record, mut rows) = (Record::default(), Vec::new());
+        while reader.next(&mut record)? {
+            rows.push((record.line, record.cells()));
+        }
+        Ok(rows)
+    }
+
+    fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Rows {
+        all(&mut opened(text.as_bytes(), delimiter, comment)).unwrap()
+    }
+
+    fn row(line: u64, fields: &[&str]) -> (u64, Vec<String>) {
+        (line, fields.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn line_numbers_survive_crlf_comments_and_empty_lines() {
+        let text = "a,b\r\n\r\n# no row\r\n1,2\r\n\n3, 4";
+        assert_eq!(rows(text, ",", Some("#")), [row(1, &["a", "b"]), row(4, &["1", "2"]), row(6, &["3", "4"])]);
+        assert_eq!(rows("a\rb,c\r\n\r1\n", ",", None), [row(1, &["a\rb", "c"]), row(2, &["1"])]);
+    }
+
+    #[test]
+    fn quoted_fields_hold_delimiters_quotes_and_line_ends() {
+        let text = "\"a;\"\"b\"\"\";2\n \"x\ny\" ;3\n4;5;\n;;\n";
+        let expected = [row(1, &["a;\"b\"", "2"]), row(2, &["x\ny", "3"]), row(4, &["4", "5", ""]), row(5, &["", "", ""])];
+        assert_eq!(rows(text, ";", None), expected);
+        // A quote inside a field, or behind a closed one, is text.
+        assert_eq!(
+            rows("5\" pipe,\"a\"b,\"\"\n6\",\"\"\"\"", ",", None),
+            [row(1, &["5\" pipe", "ab", ""]), row(2, &["6\"", "\""])]
+        );
+        assert_eq!(
+            rows("\"a\r\n\r\n# b\",1\n \"\"\"\nc\"\"\",2", ",", Some("#")),
+            [row(1, &["a\n\n# b", "1"]), row(4, &["\"\nc\"", "2"])]
+        );
+    }
+
+    #[test]
+    fn runs_of_blanks_separate_where_whitespace_does() {
+        let text = "  a\t b  \n1   \"two words\"  3\n \"c\nd\"  e \n f\"g h\"\n";
+        let expected = [row(1, &["a", "b"]), row(2, &["1", "two words", "3"]), row(3, &["c\nd", "e"]), row(5, &["f\"g", "h\""])];
+        assert_eq!(rows(text, "whitespace", None), expected);
+        assert_eq!(rows("a\tb\n\t\n", "tab", None), [row(1, &["a", "b"]), row(2, &["", ""])]);
+    }
+
+    #[test]
+    fn a_quote_that_is_never_closed_is_a_fault_of_its_line() {
+        let said = |text: &str| all(&mut opened(text.as_bytes(), ",", None)).unwrap_err().to_string();
+        assert!(
+            said("a,b\n\"never closed\n1,2\n").contains("a.csv:2")
+                && said("a,b\n\"never").contains("a quoted field is not closed")
+        );
+        for length in [LONGEST - 3, LONGEST - 2, LONGEST - 1, LONGEST, LONGEST + 1] {
+            let said = said(&format!("\"{}\n{}\n", "a".repeat(length - 2), "b".repeat(100)));
+            assert!(said.contains("a row of more than 1 MiB"), "{length}: {said}");
+        }
+        // At once, however many lines and quotes it takes in.
+        for line in ["a\n", "\"\"\n"] {
+            let said = said(&format!("\"{}", line.repeat(LONGEST)));
+            assert!(said.contains("a row of more than 1 MiB"), "{said}");
+        }
+    }
+}
