@@ -60,15 +60,6 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let round = rounds.search(&view, &now, &fitter);
         tell(words::of_a_round(rounds.count(), round.cells, round.causes.iter().map(|cause| &cause.form)));
         let next = fitter.fit(&now.model, round.causes);
-        if std::env::var("DBG").is_ok() {
-            let specs = next.model.stack.specs();
-            for k in 0..next.model.x.len() {
-                let s = &specs[k];
-                if next.ranges.first().is_none_or(|r| k < r.start) {
-                    eprintln!("T {} x {:.3e} prior {:.1e} {:?}", s.name, next.model.x[k], s.prior_sigma, next.fitted.statuses[k]);
-                }
-            }
-        }
         let Some(answer) = round.answer else {
             now = next;
             fitter.follow(&now);

@@ -7,10 +7,10 @@
 use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
-use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::criteria::cells::SETTLED;
-use crate::diagnose::table::{Answer, FoundCell};
+use crate::criteria::noise::{AS_GOOD, CLEARER, PLAIN};
 use crate::diagnose::linear::{orthonormal, project};
+use crate::diagnose::table::{Answer, FoundCell};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
 use crate::robot::Measurements;
@@ -44,9 +44,6 @@ pub(crate) fn correlation_left_by(settled: &FitState, answer: &Answer, fitter: &
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
-        if std::env::var("DBG").is_ok() {
-            eprintln!("T noise alone {cost:.1} {other:?} with all {best:.1} believed {believed:.1} price {price:.1} clearer {}", *CLEARER);
-        }
         // Causes that were not found yet look like such noise, too.
         let clearer = if answer.nothing_last > *SETTLED { *CLEARER } else { 10.0 * *CLEARER };
         if cost + clearer < best.min(believed) && other.is_some() {

@@ -7,7 +7,9 @@ use crate::criteria::noise::{ESTIMATES, REPEATS, SETTLED};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
-use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen};
+use crate::estimate::{
+    ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen,
+};
 use crate::robot::Measurements;
 use std::ops::Range;
 

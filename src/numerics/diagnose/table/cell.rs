@@ -178,7 +178,11 @@ impl FreeShape {
                     shares[0] = 0.0;
                     let sum: f64 = shares.iter().sum();
                     let shares = shares.into_iter().map(|share| share / sum).collect();
-                    CellShape { shares: over_fields(shares, self.motion, fields), log_weight: -(lengths.len() as f64).ln(), is_bent: false }
+                    CellShape {
+                        shares: over_fields(shares, self.motion, fields),
+                        log_weight: -(lengths.len() as f64).ln(),
+                        is_bent: false,
+                    }
                 };
                 let shapes = lengths.iter().copied().map(shape).collect();
                 vec![ShapeGroup { forms: vec![form], shapes, positive: false, largest: f64::INFINITY }]

@@ -3,7 +3,7 @@
 
 use super::evidence::EvidenceRows;
 use crate::criteria::cells::{EVEN, FAR, UNEVEN};
-use crate::diagnose::linear::{orthonormal, project};
+use crate::diagnose::linear::{dot, orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Form, Law, Motion, Variable};
 use faer::linalg::matmul::matmul;
@@ -31,6 +31,21 @@ pub(super) struct UnitColumns {
     pub square: Vec<f64>,
 }
 
+/// A direction in which a motion moves the rows.
+struct Direction {
+    /// By a unit, weighed, residual rows of readings.
+    weighed: Vec<f64>,
+    /// Squared motion of each row by a unit, its share in the mean over the rows.
+    square: Vec<f64>,
+}
+
+/// Columns one after another, of so many rows, weighed and of unit rms motion, with the mean squared motion by a unit of each.
+struct Weighed {
+    columns: Vec<f64>,
+    rows: usize,
+    square: Vec<f64>,
+}
+
 /// The rows of the recording around a model.
 pub(super) struct SearchRows<'a> {
     pub view: &'a RoundView<'a>,
@@ -39,7 +54,7 @@ pub(super) struct SearchRows<'a> {
     /// Variance of one number of a row, m2 or rad2, by which columns become sizes.
     variance: Vec<f64>,
     noise: NoiseShape,
-    directions: Vec<(Motion, Vec<Vec<f64>>)>,
+    directions: Vec<(Motion, Vec<Direction>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
@@ -67,16 +82,6 @@ impl<'a> SearchRows<'a> {
         project(out.base.as_ref(), &mut residual);
         out.residual = residual;
         out
-    }
-
-    pub fn parts(&self) -> String {
-        let points = self.view.problem.of_readings().len();
-        let sum = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
-        format!("points {} of {} currents {} of {} raw {} factor {:?} model {}", sum(&self.residual[..points]), points, sum(&self.residual[points..]), self.residual.len() - points, sum(&self.view.problem.residual[points..]), self.noise.currents, sum(&self.view.problem.residual[..points]))
-    }
-
-    pub fn residual_rows(&self) -> usize {
-        self.residual.len()
     }
 
     /// What is left, and how many rows say something of their own.
@@ -114,7 +119,9 @@ impl<'a> SearchRows<'a> {
         let problem = &self.view.problem;
         let fresh: Vec<Motion> =
             motions.iter().filter(|motion| !self.directions.iter().any(|(other, _)| other == *motion)).copied().collect();
-        self.directions.par_extend(fresh.into_par_iter().map(|motion| (motion, problem.directions(motion))));
+        let directions = |motion| problem.directions(motion).into_iter().map(|raw| self.direction(raw)).collect();
+        let fresh: Vec<(Motion, Vec<Direction>)> = fresh.into_par_iter().map(|motion| (motion, directions(motion))).collect();
+        self.directions.extend(fresh);
         let fresh: Vec<Variable> =
             variables.iter().filter(|of| !self.values.iter().any(|(other, _)| other == *of)).copied().collect();
         self.values.par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
@@ -123,59 +130,108 @@ impl<'a> SearchRows<'a> {
     /// UnitColumns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
     /// anything of these.
     pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
-        let (all, points, problem) = (self.residual.len(), self.view.problem.of_readings().len(), &self.view.problem);
-        let of = |form: &Form| match self.of_term(form) {
-            Some(columns) => (columns, points),
-            None => (problem.motions_by(form), all),
-        };
-        let each: Vec<(Vec<f64>, usize)> = forms.iter().map(of).collect();
-        let moves_currents =
-            |(columns, rows): &(Vec<f64>, usize)| columns.chunks(*rows).any(|column| column[points..].iter().any(|v| *v != 0.0));
-        let rows = if each.iter().any(moves_currents) { all } else { points };
-        let mut raw = Vec::new();
-        let mut counts = Vec::with_capacity(forms.len());
-        for (columns, own) in each {
-            counts.push(columns.len() / own.max(1));
-            for column in columns.chunks(own) {
-                raw.extend_from_slice(&column[..own.min(rows)]);
-                raw.resize(raw.len() + rows.saturating_sub(own), 0.0);
+        let each: Vec<Weighed> = forms.iter().map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form))).collect();
+        let rows = each.iter().map(|own| own.rows).max().unwrap_or(self.residual.len());
+        let mut values = Vec::with_capacity(rows * each.iter().map(|own| own.square.len()).sum::<usize>());
+        for own in &each {
+            for column in own.columns.chunks(own.rows.max(1)) {
+                values.extend_from_slice(column);
+                values.resize(values.len() + rows - own.rows, 0.0);
             }
         }
-        let square: Vec<f64> = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
-        for (column, square) in raw.chunks_mut(rows).zip(&square) {
-            problem.innovate(column);
-            self.weigh(column);
-            let scale = if *square > 0.0 { square.sqrt().recip() } else { 0.0 };
-            column.iter_mut().for_each(|value| *value *= scale);
-        }
-        project(self.base.as_ref().subrows(0, rows), &mut raw);
-        (UnitColumns { values: DMatrix::from_vec(rows, raw.len() / rows.max(1), raw), square }, counts)
+        project(self.base.as_ref().subrows(0, rows), &mut values);
+        let counts = each.iter().map(|own| own.square.len()).collect();
+        let square: Vec<f64> = each.into_iter().flat_map(|own| own.square).collect();
+        (UnitColumns { values: DMatrix::from_vec(rows, square.len(), values), square }, counts)
     }
 
-    /// UnitColumns of a law at a place from the motion's directions and the law's functions.
-    fn of_term(&self, form: &Form) -> Option<Vec<f64>> {
+    /// The columns of any form; without the rows of currents where it says nothing of these.
+    fn of_form(&self, form: &Form) -> Weighed {
+        let (all, points, problem) = (self.residual.len(), self.view.problem.of_readings().len(), &self.view.problem);
+        let mut columns = problem.motions_by(form);
+        let silent = columns.chunks(all.max(1)).all(|column| column[points..].iter().all(|value| *value == 0.0));
+        let rows = if silent { points } else { all };
+        if silent && points < all {
+            columns = columns.chunks(all).flat_map(|column| column[..points].iter().copied()).collect();
+        }
+        let square: Vec<f64> = columns.chunks(rows.max(1)).map(|column| self.mean_square(column)).collect();
+        for (column, square) in columns.chunks_mut(rows.max(1)).zip(&square) {
+            problem.innovate(column);
+            self.weigh(column);
+            let scale = unit(*square);
+            column.iter_mut().for_each(|value| *value *= scale);
+        }
+        Weighed { columns, rows, square }
+    }
+
+    /// How much of the squared length of `left` the columns of a law at a place explain if they are orthogonal; nothing of what needs more.
+    pub fn roughly(&self, form: &Form, left: &[f64]) -> Option<f64> {
+        let term = form.term().filter(|_| !self.view.problem.is_correlated())?;
+        let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
+        let functions = self.functions(term.law())?;
+        let mut fit = 0.0;
+        for Direction { weighed, .. } in directions {
+            let of_row = |i: usize| {
+                let lines = self.view.problem.readings_of(i);
+                let sums = lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
+                sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
+            };
+            let rows: Vec<[f64; 2]> = (0..self.variance.len()).map(of_row).collect();
+            for function in &functions {
+                let sums = function.iter().zip(&rows).map(|(value, [along, square])| [value * along, value * value * square]);
+                let [along, square] = sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+                fit += along * along / square.max(f64::MIN_POSITIVE);
+            }
+        }
+        Some(fit)
+    }
+
+    /// What is needed of a direction of a motion by a unit.
+    fn direction(&self, mut raw: Vec<f64>) -> Direction {
+        raw.truncate(self.view.problem.of_readings().len());
+        let count = self.variance.len().max(1) as f64;
+        let of_row = |(i, variance): (usize, &f64)| {
+            raw[self.view.problem.readings_of(i)].iter().map(|value| value * value).sum::<f64>() * variance / count
+        };
+        let square = self.variance.iter().enumerate().map(of_row).collect();
+        if !self.view.problem.is_correlated() {
+            self.weigh(&mut raw);
+        }
+        Direction { weighed: raw, square }
+    }
+
+    /// The columns of a law at a place from the motion's directions and the law's functions.
+    fn of_term(&self, form: &Form) -> Option<Weighed> {
         let term = form.term()?;
         let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
         let functions = self.functions(term.law())?;
-        let rows = self.view.problem.of_readings().len();
-        let mut out = vec![0.0; rows * directions.len() * functions.len()];
-        let put = |direction: &[f64], function: &[f64], column: &mut [f64]| {
-            for (i, value) in function.iter().enumerate() {
-                self.view.problem.readings_of(i).for_each(|line| column[line] = direction[line] * value);
-            }
-        };
-        let mut columns = out.chunks_mut(rows);
+        let (problem, rows) = (&self.view.problem, self.view.problem.of_readings().len());
+        let squared: Vec<Vec<f64>> =
+            functions.iter().map(|function| function.iter().map(|value| value * value).collect()).collect();
+        let count = directions.len() * functions.len();
         // In the order of the term's coefficients: a frame's axes alternate.
-        if matches!(term.motion(), Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. }) {
-            for function in &functions {
-                directions.iter().zip(&mut columns).for_each(|(direction, column)| put(direction, function, column));
+        let alternate = matches!(term.motion(), Motion::Base { .. } | Motion::Tool { .. } | Motion::Tracker { .. });
+        let pair = |k: usize| {
+            if alternate { (k % directions.len(), k / directions.len()) } else { (k / functions.len(), k % functions.len()) }
+        };
+        let (mut columns, mut square) = (vec![0.0; rows * count], Vec::with_capacity(count));
+        for (k, column) in columns.chunks_mut(rows.max(1)).enumerate().take(count) {
+            let (direction, function) = pair(k);
+            let own = dot(&squared[function], &directions[direction].square);
+            let scale = unit(own);
+            square.push(own);
+            for (i, value) in functions[function].iter().enumerate() {
+                let by = value * scale;
+                for line in problem.readings_of(i) {
+                    column[line] = directions[direction].weighed[line] * by;
+                }
             }
-        } else {
-            for direction in directions {
-                functions.iter().zip(&mut columns).for_each(|(function, column)| put(direction, function, column));
+            if problem.is_correlated() {
+                problem.innovate(column);
+                self.weigh(column);
             }
         }
-        Some(out)
+        Some(Weighed { columns, rows, square })
     }
 
     /// The functions of a law at every row; none of a variable of several numbers, or that some row does not tell.
@@ -318,6 +374,11 @@ fn evened(sum: Matrix3<f64>, count: f64) -> Option<Matrix3<f64>> {
     }
     let roots = Matrix3::from_diagonal(&parts.eigenvalues.map(|variance| (even / variance).sqrt()));
     Some(parts.eigenvectors * roots * parts.eigenvectors.transpose())
+}
+
+/// What makes a motion of this mean square one of unit size; 0 of none.
+fn unit(square: f64) -> f64 {
+    if square > 0.0 { square.sqrt().recip() } else { 0.0 }
 }
 
 /// Transpose of `a` times `b`; where one has fewer rows the others count as zero.

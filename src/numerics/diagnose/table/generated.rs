@@ -43,7 +43,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
-    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN || std::env::var("NOFREE").is_ok();
+    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN;
     let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
         let families = families(place, survey);
@@ -75,7 +75,7 @@ pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question
 /// Products of a motion's variable that shows with every other one that it may follow.
 pub(super) fn products(shown: &[FreeShape], survey: &Survey, frame: &mut SearchRows) -> Vec<CauseCell> {
     let mut out: Vec<CauseCell> = Vec::new();
-    for FreeShape { motion, of, .. } in shown.iter().filter(|_| std::env::var("NOFREE").is_err()) {
+    for FreeShape { motion, of, .. } in shown {
         let kinds = kinds(motion.place(), *motion, survey);
         let others: Vec<Variable> = kinds.into_iter().flatten().map(|(other, _)| other).filter(|other| other != of).collect();
         frame.prepare(&[*motion], &others);

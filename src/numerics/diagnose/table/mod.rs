@@ -64,7 +64,6 @@ impl Rounds {
     /// Searches around a fitted model.
     pub fn search(&mut self, view: &RoundView, now: &FitState, fitter: &Fitter) -> Round {
         self.round += 1;
-        if std::env::var("DBG").is_ok() { eprintln!("T time begin {:.2}", cpu()); }
         let survey = view.survey();
         let noise = if self.round > 1 {
             NoiseShape::of(view, fitter.data.rows())
@@ -72,7 +71,6 @@ impl Rounds {
             NoiseShape::at_first(view, fitter.data.rows())
         };
         let mut frame = SearchRows::of(view, now, fitter, noise);
-        if std::env::var("DBG").is_ok() { eprintln!("T time frame {:.2}", cpu()); }
         let question = fitter.question;
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
         let brought = only_brought(&fitter.data, question.fit);
@@ -89,7 +87,6 @@ impl Rounds {
         let mut table = CauseTable::new(&mut frame, &survey, question, products, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
-        if std::env::var("DBG").is_ok() { eprintln!("T time table {:.2}", cpu()); }
         let mut components = Vec::new();
         for (key, own) in std::mem::take(&mut self.components) {
             if let Some(cell) = table.cell(&key) {
@@ -103,35 +100,16 @@ impl Rounds {
         }
         let has_begun = !components.is_empty();
         components = if has_begun { table.backfit(components, 1) } else { table.start() };
-        if std::env::var("DBG").is_ok() { eprintln!("T time start {:.2}", cpu()); }
         // Joints that yield come first: masses and currents speak of what yields in the model, and large motions are not linear.
         let waits = !has_begun && !components.is_empty() && self.round < *ROUNDS;
         if !waits {
             components = table.grow(components);
-            if std::env::var("DBG").is_ok() { eprintln!("T time grow {:.2}", cpu()); }
             components = table.prune(components);
-            if std::env::var("DBG").is_ok() { eprintln!("T time prune {:.2}", cpu()); }
         }
         if !waits && !components.is_empty() {
             components = table.swap(components);
-            if std::env::var("DBG").is_ok() { eprintln!("T time swap {:.2}", cpu()); }
             components = table.grow(components);
-            if std::env::var("DBG").is_ok() { eprintln!("T time grow2 {:.2}", cpu()); }
             components = table.by_several(components);
-            if std::env::var("DBG").is_ok() { eprintln!("T time periodic {:.2}", cpu()); }
-        }
-        if std::env::var("DBG").is_ok() {
-            let all: Vec<&Component> = components.iter().collect();
-            let state = table.state(&all, None);
-            eprintln!("ROUND square {:.1} freedom {:.1} {}", state.rows.square, state.rows.freedom, table.frame.parts());
-            eprintln!("ROUND {} kappa {:.3} cells {} columns {} cpu {:.2}", self.round, state.kappa, table.cells.len(), table.first.last().unwrap_or(&0), cpu());
-            for (i, own) in components.iter().enumerate() {
-                let others = search::without(&components, &[i]);
-                let rest: Vec<&Component> = others.iter().collect();
-                let st = table.state(&rest, Some(state.kappa));
-                let log = table.log_evidence(own, &st, &rest);
-                eprintln!("   {:60} um {:8.2} log {:8.1} prior {:5.1} cols {} part {} {}", table.cells[own.cell].key, own.amplitude * 1e6, log, table.cells[own.cell].log_prior, own.values.ncols(), own.part.ncols(), own.forms.iter().map(|f| f.key()).collect::<Vec<_>>().join(" + "));
-            }
         }
         let keys: Vec<String> = components.iter().map(|own| table.cells[own.cell].key.clone()).collect();
         let sorted = |keys: &[String]| {
@@ -151,7 +129,6 @@ impl Rounds {
             self.pairs = Some(seen);
         }
         let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
-        if std::env::var("DBG").is_ok() { eprintln!("T time answer {:.2}", cpu()); }
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();
@@ -220,10 +197,4 @@ fn without_idle_waves(form: &Form, count: usize, seen: &dyn Fn(usize) -> bool) -
         (0..fields).flat_map(|field| (0..last).map(move |wave| field * waves + wave)).collect()
     };
     (Form::from(term.with(law)), kept)
-}
-
-pub(super) fn cpu() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<f64> = text.rsplit(')').next().unwrap_or("").split_whitespace().filter_map(|t| t.parse().ok()).collect();
-    (fields.get(10).unwrap_or(&0.0) + fields.get(11).unwrap_or(&0.0)) / 100.0
 }

@@ -233,8 +233,11 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             _ => None,
         };
         let cell = &self.cells[own.cell];
-        let (Some(variable), Some(place), Shapes::Free(_)) = (of(cell), along(cell.place), &cell.shapes) else { return Vec::new() };
-        let near = |other: &CauseCell| of(other) == Some(variable) && along(other.place).is_some_and(|at| place.abs_diff(at) <= 2);
+        let (Some(variable), Some(place), Shapes::Free(_)) = (of(cell), along(cell.place), &cell.shapes) else {
+            return Vec::new();
+        };
+        let near =
+            |other: &CauseCell| of(other) == Some(variable) && along(other.place).is_some_and(|at| place.abs_diff(at) <= 2);
         (0..self.cells.len()).filter(|k| near(&self.cells[*k])).collect()
     }
 
@@ -381,7 +384,15 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             state.shapes(&block, &across, 0, |_, _, found| logs.push(found.log));
             log_sum(&logs)
         };
-        let seen = pairs.par_iter().map(|free| (log(free), *free)).filter(|(log, _)| log + PAIR.ln() > *JOINS);
+        let left = state.left(components, self.frame);
+        let rough = |free: &FreeShape| {
+            let groups = free.groups(self.survey, &values, false);
+            Some((self.frame.roughly(groups.first()?.forms.first()?, &left)?, *free))
+        };
+        let mut promising: Vec<(f64, FreeShape)> = pairs.par_iter().filter_map(rough).collect();
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        promising.truncate(6 * *PAIRS);
+        let seen = promising.par_iter().map(|(_, free)| (log(free), *free)).filter(|(log, _)| log + PAIR.ln() > *JOINS);
         let mut seen: Vec<(f64, FreeShape)> = seen.collect();
         seen.sort_by(|a, b| b.0.total_cmp(&a.0));
         seen.into_iter().take(*PAIRS).map(|(_, free)| free).collect()
@@ -522,7 +533,8 @@ fn climb<T: Clone>(
     let (mut now, (mut log, mut amplitude), mut moved) = (first, start, false);
     for level in 0..*LEVELS {
         loop {
-            let tried = near(&now, level).into_iter().filter_map(|other| value(&other).map(|(log, amplitude)| (log, amplitude, other.0)));
+            let tried =
+                near(&now, level).into_iter().filter_map(|other| value(&other).map(|(log, amplitude)| (log, amplitude, other.0)));
             let paid = |(log, _, other): &(f64, f64, T)| log - price(&now, other);
             let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else { break };
             if paid(&next) <= log + 1e-6 {

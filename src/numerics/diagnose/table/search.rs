@@ -244,9 +244,6 @@ impl CauseTable<'_, '_> {
                 let found = scan.closely[&best].clone();
                 next.push(self.component(best, &found));
                 next = self.backfit(next, 1);
-                if std::env::var("DBG").is_ok() {
-                    eprintln!("T several {} for {}: {:.1} {:.1} added {}", named.len(), id, self.total(&next, kappa), before, next.last().map_or("", |own| &self.cells[own.cell].key));
-                }
                 if self.total(&next, kappa) > before {
                     components = next;
                     break;

@@ -255,18 +255,22 @@ impl KnownState {
 
     /// The likeliest coefficients (SI) of its components, one component after another.
     pub fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
-        let z = side_by_side(components, frame.residual_rows());
-        let mut weights = self.along.clone();
-        let count = weights.len();
-        let out = MatMut::from_column_major_slice_mut(weights.as_mut_slice(), count, 1);
-        solve_upper_triangular_in_place(self.lower.transpose(), out, Par::Seq);
-        let left = DVector::from_column_slice(frame.residual()) - z * weights;
+        let left = DVector::from_vec(self.left(components, frame));
         let of = |own: &&Component| {
             let along = own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
             let scaled = own.roots().zip(own.sigmas()).zip(along.iter());
             scaled.map(|((root, sigma), along)| sigma * root * along).collect()
         };
         components.iter().map(of).collect()
+    }
+
+    /// What its components leave of the residual at their likeliest.
+    pub fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
+        let residual = DVector::from_column_slice(frame.residual());
+        let left = self
+            .weights()
+            .map_or_else(|| residual.clone(), |weights| &residual - side_by_side(components, residual.len()) * weights);
+        left.data.into()
     }
 
     /// The likeliest weights of its columns; none where it has none.

@@ -103,6 +103,11 @@ impl<'a> WhitenedProblem<'a> {
         self
     }
 
+    /// Whether the noise is correlated from row to row.
+    pub fn is_correlated(&self) -> bool {
+        self.innovations.is_some()
+    }
+
     /// Takes what a column says of readings to their innovations.
     pub fn innovate(&self, column: &mut [f64]) {
         if let Some(innovations) = &self.innovations {
