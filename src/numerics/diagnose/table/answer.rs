@@ -7,7 +7,7 @@ use super::listed::cell_of;
 use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
-use crate::criteria::cells::{MISLED, NU, RIVAL};
+use crate::criteria::cells::{BENDS, MISLED, NU, RIVAL};
 use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
 use std::collections::BTreeMap;
@@ -151,7 +151,12 @@ impl CauseTable<'_, '_> {
             if probability < 1e-6 {
                 continue;
             }
-            let bends = |found: &super::scan::CellEvidence| (found.bent - found.log).exp().clamp(0.0, 1.0);
+            // A bend pays for its further numbers here as where shapes are chosen.
+            let bends = |found: &super::scan::CellEvidence| {
+                let bent = (found.bent - found.log).exp().clamp(0.0, 1.0);
+                let paid = bent * (-*BENDS).exp();
+                paid / (paid + 1.0 - bent).max(f64::MIN_POSITIVE)
+            };
             let bent = scan.closely.get(&k).map_or(0.0, bends);
             // What was refined stands for its cell.
             let bent = if k == own && component.shape.is_bent { bent.max(0.9) } else { bent };
