@@ -3,7 +3,7 @@
 use super::faults::{faults, rows_apart};
 use super::last_round::LastRound;
 use super::rivals::share_with_identities;
-use crate::criteria::cells::{DETAIL, FAINT, TRACE};
+use crate::criteria::cells::{DETAIL, FAINT, SMALLEST, TRACE};
 use crate::criteria::words::FIRM;
 use crate::diagnose::round::FitState;
 use crate::diagnose::table::FoundCell;
@@ -13,6 +13,7 @@ use crate::effect::{
     Clock, FittedForms, Form, ModelledFinding, ParameterEstimate, Place, Summary, Variable, names, people, turned_holder,
 };
 use crate::estimate::{Model, ParameterStatus, tail};
+use crate::observation::Dimension;
 
 /// The causes of the last round as findings, strongest first; `something_left` says whether they leave more than noise.
 pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
@@ -44,6 +45,11 @@ fn without_details(last: &LastRound) -> Vec<(FoundCell, Vec<usize>)> {
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<(f64, FoundCell, Vec<usize>)> = Vec::new();
     for (rms, found, details) in all {
+        // No instrument sees so little of the tool: currents alone speak of it.
+        if rms < *SMALLEST && !out.is_empty() && last.scale.dimension() == Dimension::Length {
+            out[0].2.extend(&found.members);
+            continue;
+        }
         let first = (found.effect == names::UNKNOWN).then(|| {
             let here = out.iter().position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
             let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| rms < *TRACE * most || found.log < *FAINT * strongest;
