@@ -1,7 +1,7 @@
 //! Functions of one variable, linear in their coefficients, with few shape numbers (in the variable's SI unit).
 
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 /// A function of one variable, or a few.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -229,6 +229,22 @@ impl Basis {
         )
     }
 
+    /// What a function may be off (one standard deviation, for a coefficient of 1) where the variable is `off` beyond the fitted range, which
+    /// is `share` of that, and the function has `value`.
+    ///
+    /// A curve is held at the end of its range: a smooth one of its spectrum departs from that by p sqrt(1 - cos(k pi off / width)) up to where
+    /// it knows nothing of it. All else may be off by what it is, one range beyond.
+    pub(super) fn off(&self, k: usize, value: f64, off: f64, share: f64) -> f64 {
+        match *self {
+            Self::Cosines { low, high, .. } | Self::Fading { low, high, .. } => departure(k + 1, off / (high - low)),
+            Self::Series { low, high, .. } => departure(k, off / (high - low)),
+            // Sine and cosine together are their size whatever the phase.
+            Self::Wave { .. } | Self::Sway { .. } => share * FRAC_1_SQRT_2,
+            Self::Straight { .. } if k == 0 => 0.0,
+            _ => share * value.abs(),
+        }
+    }
+
     /// The values of its functions at `u`, numbered.
     pub(crate) fn at(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
         match *self {
@@ -309,6 +325,14 @@ impl Basis {
             Self::Settling { start, constant } => each(0, 1.0 - libm::exp(-(u - start).max(0.0) / constant)),
         }
     }
+}
+
+/// Root mean square of what a cosine of a phase that is not known departs from itself over a share of its range, at most 1.
+fn departure(order: usize, share: f64) -> f64 {
+    if order == 0 {
+        return 0.0;
+    }
+    (1.0 - libm::cos(PI * (order as f64 * share).min(0.5))).sqrt()
 }
 
 /// Cosines of `u` held within the range, see [`Basis::Cosines`].

@@ -3,7 +3,7 @@
 use super::form::placed;
 use super::motion::{SHORT, extent};
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, Place, Placed, Summary, Survey, Variable, about, names};
-use crate::criteria::effect::{RARE, UNLIKELY};
+use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -69,6 +69,14 @@ impl Cause for LinkCompliance {
     }
 }
 
+impl BentLink {
+    /// The middle of the link, m, and the moment about that, Nm.
+    fn moment(&self, robot: &RobotModel, state: &ArmState) -> (Vector3<f64>, Vector3<f64>) {
+        let middle = robot.point(self.link) + extent(robot, self.link) * 0.5;
+        (middle, state.posture.moment(self.link + 1, &middle))
+    }
+}
+
 impl Placed for BentLink {
     placed! { self: Place::Links(self.link, self.link), &LinkCompliance, [Variable::ArmLoad], self }
 
@@ -84,9 +92,8 @@ impl Placed for BentLink {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let along = extent(robot, self.link);
-        let middle = robot.point(self.link) + along * 0.5;
         let station = self.link + 1;
-        let moment = state.posture.moment(station, &middle);
+        let (middle, moment) = self.moment(robot, state);
         let without = |direction: &Vector3<f64>| moment - direction * direction.dot(&moment);
         match self.bending {
             Bending::AcrossLink => out.shift(0, p, station, screw(&without(&along.normalize()), &middle)),
@@ -97,6 +104,14 @@ impl Placed for BentLink {
                 }
             }
         }
+    }
+
+    fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
+        vec![Some(self.moment(robot, state).1.norm())]
+    }
+
+    fn doubt(&self) -> f64 {
+        *STIFFNESS_BEYOND
     }
 
     fn needs_torque(&self) -> bool {

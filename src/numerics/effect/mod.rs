@@ -84,7 +84,7 @@ pub use cable_drag::CableDrag;
 pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, arm_effect, cause, hypotheses, identified};
 pub use change::moved_with_the_payload;
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
-pub use deflection::{Deflection, Direction};
+pub use deflection::{BeyondFitted, Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
 pub use joint_compliance::JointCompliance;
