@@ -370,6 +370,19 @@ mod tests {
     }
 
     #[test]
+    fn beyond_its_range_a_rough_curve_knows_nothing_soon_and_a_smooth_one_later() {
+        let curve = Basis::Cosines { low: 0.0, high: 2.0, count: 6 };
+        let off = |basis: Basis, k: usize, value: f64, off: f64| basis.off(k, value, off, 0.5 * off);
+        // A quarter of the support: sqrt(1 - cos 45 deg); the fourth cosine is at a right angle already.
+        assert!((off(curve, 0, 0.3, 0.5) - 0.541_196_1).abs() < 1e-7);
+        assert_eq!([off(curve, 3, 0.3, 0.5), off(curve, 5, 0.0, 9.0), off(curve, 0, 0.3, 0.0)], [1.0, 1.0, 0.0]);
+        let series = Basis::Series { low: 0.0, high: 2.0, count: 6 };
+        assert_eq!([off(series, 0, 1.0, 9.0), off(series, 4, 0.0, 0.5)], [0.0, 1.0]);
+        assert!((off(Basis::Wave { order: 3, overtone: false }, 1, 0.0, 1.0) - 0.5 * FRAC_1_SQRT_2).abs() < 1e-12);
+        assert!((off(Basis::PROPORTIONAL, 0, -2.0, 0.6) - 0.6).abs() < 1e-12);
+    }
+
+    #[test]
     fn steps_and_corners_are_what_their_knots_say_and_stay_so_in_json() {
         let steps = Basis::Steps { knots: Knots::new([0.5, -0.5]) };
         assert_eq!([-1.0, 0.0, 0.6].map(|u| values(steps, u)), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);

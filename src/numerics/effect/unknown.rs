@@ -168,9 +168,12 @@ impl Cause for Unknown {
         match term.motion() {
             Motion::Joint { .. } => {
                 let loaded = term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. }));
-                let (unit, sigma) = match loaded {
-                    true => (Unit::RadianPerNewtonMetre, PER_LOAD),
-                    false => (term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+                let per_load = term.law().times.is_some_and(|factor| loaded && factor.basis == Basis::PROPORTIONAL);
+                let unit = if per_load { Unit::RadianPerNewtonMetre } else { term.motion().unit(robot) };
+                let sigma = match loaded {
+                    true => PER_LOAD,
+                    false if term.is_own_curve() => PLAUSIBLE,
+                    false => WIDE,
                 };
                 counted.map(|k| (format!("c{k}"), unit, sigma)).collect()
             }

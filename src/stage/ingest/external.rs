@@ -63,8 +63,8 @@ pub(super) fn must_stand(opened: &OpenedFile, layout: &FileLayout, arm: &RobotJo
     };
     let Some((_, name, _, [least, most])) = all.iter().find(moves) else { return Ok(()) };
     let message = format!(
-        "column `{name}` is an axis beside the robot's {} joints, and moves from {least} to {most}: what stands on it moves with it, and the \
-         robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or another \
+        "column `{name}` is an external axis, in addition to the robot's {} joints, and moves from {least} to {most}: what stands on it moves with \
+         it, and the robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or another \
          name for the column if it is no axis",
         arm.joints()
     );
