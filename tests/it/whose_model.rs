@@ -8,6 +8,8 @@ use calib::spatial::Pose;
 use calib::table::{Parameters, Table, from_file};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use parquet::arrow::ArrowWriter;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
 use serde_json::Value;
 use std::path::Path;
 
@@ -21,7 +23,7 @@ fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn a_model_is_refused_for_another_robot_and_an_older_table_says_that_it_cannot_tell() {
+fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whose_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     std::fs::copy(cell().join(".calib/tables/small").join(PARAMETERS), here.join(PARAMETERS)).expect("a table");
@@ -45,17 +47,30 @@ fn a_model_is_refused_for_another_robot_and_an_older_table_says_that_it_cannot_t
             assert!(told.contains(sentence), "{robot}: {told}");
         }
     }
-    // As an earlier calib wrote it.
+    // As an earlier calib wrote it, its content hash with it or lost.
     let mut table = from_file::<Parameters>(&here.join(PARAMETERS)).expect("a table").table;
     table.0.iter_mut().for_each(|row| (row.robot, row.kinematics) = (None, None));
     let frame = table.to_frame().expect("a frame");
-    let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
-    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
-    writer.write(frame.batch()).expect("rows");
-    writer.close().expect("a file");
-    let (code, _, told) = said(here, &["compensate", "older.parquet", "--unchecked", "--robot", "renamed.yaml"]);
-    assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains("does not say which robot it is the model of"), "{told}");
+    for hashed in [true, false] {
+        let hash = KeyValue::new("calib.table_hash".into(), frame.table_hash().to_string());
+        let properties = WriterProperties::builder().set_key_value_metadata(hashed.then(|| vec![hash])).build();
+        let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
+        let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), Some(properties)).expect("a writer");
+        writer.write(frame.batch()).expect("rows");
+        writer.close().expect("a file");
+        for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
+            let ask = [verb, &["older.parquet", "--robot", "renamed.yaml"]].concat();
+            let (code, out, told) = said(here, &ask);
+            assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+            assert!(
+                told.contains("--unchecked") && (!hashed || told.contains("does not say which robot it is the model of")),
+                "{told}"
+            );
+            let (code, _, told) = said(here, &[&ask[..], &["--unchecked"]].concat());
+            assert_eq!(code, Some(0), "{told}");
+            assert!(told.contains("does not say which robot it is the model of"), "{told}");
+        }
+    }
 }
 
 /// The URDF of a report: Link1's izz is 409 times ixx + iyy, Link2 has no moment about one axis.

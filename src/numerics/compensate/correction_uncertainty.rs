@@ -73,16 +73,16 @@ impl Uncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q);
         let size = correction.norm();
         let along = if size > NOTHING { correction / size } else { Vector3::zeros() };
-        let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
+        let by_range = |one: &BeyondFitted| along.dot(&(one.covariance * along));
         let jacobian = self.along(reach, q, &along);
         let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
-        let seen = |one: &&BeyondFitted| COVERAGE * one.share * one.displacement.norm() > self.instrument;
-        let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
+        let seen = |one: &&BeyondFitted| COVERAGE * one.covariance.trace().sqrt() > self.instrument;
+        let named = |one: &BeyondFitted| (self.name(one.parameter), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
         if u95 > DOUBTFUL * size {
             let mut shares = self.by_effect(&jacobian);
-            shares.extend(beyond.iter().map(|one| (self.name(one.parameters.start), by_range(one))));
+            shares.extend(beyond.iter().map(|one| (self.name(one.parameter), by_range(one))));
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
         }
