@@ -2,14 +2,13 @@
 //! identified is the tool that goes out.
 
 use crate::compensate::{ROBOT, calib, cell};
+use crate::desk::shared;
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::table::{Parameters, Table, from_file};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use parquet::arrow::ArrowWriter;
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
 use serde_json::Value;
 use std::path::Path;
 
@@ -47,29 +46,36 @@ fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whos
             assert!(told.contains(sentence), "{robot}: {told}");
         }
     }
-    // As an earlier calib wrote it, its content hash with it or lost.
+    // As an earlier calib wrote it, without a content hash.
     let mut table = from_file::<Parameters>(&here.join(PARAMETERS)).expect("a table").table;
     table.0.iter_mut().for_each(|row| (row.robot, row.kinematics) = (None, None));
     let frame = table.to_frame().expect("a frame");
-    for hashed in [true, false] {
-        let hash = KeyValue::new("calib.table_hash".into(), frame.table_hash().to_string());
-        let properties = WriterProperties::builder().set_key_value_metadata(hashed.then(|| vec![hash])).build();
-        let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
-        let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), Some(properties)).expect("a writer");
-        writer.write(frame.batch()).expect("rows");
-        writer.close().expect("a file");
-        for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
-            let ask = [verb, &["older.parquet", "--robot", "renamed.yaml"]].concat();
-            let (code, out, told) = said(here, &ask);
-            assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
-            assert!(
-                told.contains("--unchecked") && (!hashed || told.contains("does not say which robot it is the model of")),
-                "{told}"
-            );
-            let (code, _, told) = said(here, &[&ask[..], &["--unchecked"]].concat());
-            assert_eq!(code, Some(0), "{told}");
-            assert!(told.contains("does not say which robot it is the model of"), "{told}");
-        }
+    let file = std::fs::File::create(here.join("older.parquet")).expect("a file");
+    let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
+    writer.write(frame.batch()).expect("rows");
+    writer.close().expect("a file");
+    let unchecked = ["older.parquet", "--robot", "renamed.yaml", "--unchecked"];
+    for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
+        let (code, out, told) = said(here, &[verb, &unchecked[..3]].concat());
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+        let (code, _, told) = said(here, &[verb, &unchecked].concat());
+        assert_eq!(code, Some(0), "{told}");
+        assert!(told.contains("does not say which robot it is the model of"), "{told}");
+    }
+}
+
+#[test]
+fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unless_someone_takes_it() {
+    let Some(fault) = shared("review/faults/two_robots") else { return };
+    let path = |name: &str| fault.join(name).display().to_string();
+    let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
+    for robot in ["irb.yaml", "kr6.yaml"].map(path) {
+        let ask = ["compensate", &table, "--robot", &robot, &targets];
+        let (code, out, told) = said(&fault, &ask);
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+        assert!(told.contains("does not say which robot it is the model of") && told.contains("--unchecked"), "{told}");
+        let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
+        assert!(code == Some(0) && told.contains("does not say which robot it is the model of"), "{told}");
     }
 }
 

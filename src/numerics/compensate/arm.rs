@@ -132,6 +132,13 @@ pub(super) struct BeyondFitted {
     pub covariance: Matrix3<f64>,
 }
 
+impl BeyondFitted {
+    /// Its size squared, in any direction: what a law does there may have another direction than all of the correction.
+    pub fn square(&self) -> f64 {
+        self.covariance.trace()
+    }
+}
+
 /// One arm being placed.
 pub struct Reach<'a> {
     arm: &'a IdentifiedArm,
