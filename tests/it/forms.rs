@@ -94,10 +94,11 @@ fn unnamed(survey: &Survey) -> Vec<Hypothesis> {
     let outside = [Variable::Azimuth, Variable::Elevation, Variable::Range, Variable::Sighted { along }];
     let mut out = Vec::new();
     let mut add = |motion, law| out.push(Hypothesis::new(Term::new(&Unknown, motion, law), 1));
-    for (motions, others) in [(&motions[..], &inside[..]), (&read, &outside)] {
+    for (motions, others) in [(&motions[..], &inside[..]), (&read[..], &outside[..])] {
         for (motion, of) in motions.iter().flat_map(|motion| everywhere.iter().chain(others).map(move |of| (*motion, *of))) {
-            let (low, high) = (-0.5, 1.5);
-            add(motion, Law::new(of, Basis::Linear { zero: 0.2, per: 0.7 }));
+            // Wide: what follows a load moves it a little by what it does.
+            let (low, high) = (-300.0, 900.0);
+            add(motion, Law::new(of, Basis::Linear { zero: 0.2, per: 300.0 }));
             add(motion, Law::new(of, Basis::Cosines { low, high, count: 4 }));
             add(
                 motion,

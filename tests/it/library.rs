@@ -8,7 +8,7 @@ use crate::fixture;
 use crate::identify::{model, normal};
 use crate::readme::example;
 use calib::diagnose::VerdictKind;
-use calib::effect::{Effect, EffectContext, EffectStack, GearCyclic, Load, Place, arm_effect};
+use calib::effect::{Effect, EffectContext, EffectStack, Form, Load, Place, arm_effect};
 use calib::estimate::Model;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, PointReadings, RobotModel};
@@ -57,7 +57,11 @@ fn an_arm_is_identified_from_arrays() {
 fn missing_physics_is_named_from_arrays() {
     let robot = RobotModel::new(fixture::spherical());
     let mut data = rows(&robot, 160);
-    let gear: Box<dyn Effect> = Box::new(calib::effect::Form::from(GearCyclic::term(2, 5, false)));
+    let gear = serde_json::json!({"gear_cyclic": {
+        "motion": {"joint": {"joint": 2}},
+        "law": {"of": {"angle": {"joint": 2}}, "basis": {"wave": {"order": 5, "overtone": false}}},
+    }});
+    let gear: Box<dyn Effect> = Box::new(serde_json::from_value::<Form>(gear).expect("a form"));
     let context = EffectContext { base: base(), load: Load::GravityTorque };
     let effects = vec![arm_effect("joint_offset", &context).expect("a cause"), gear];
     let mut truth = Model::nominal(robot.clone(), EffectStack::new(&robot, base(), effects));

@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 const INVISIBLE: f64 = 1e-6;
 
 /// Rows, and what a model leaves of them.
-pub(super) struct Regression<'p, 'a> {
+pub(super) struct FormRegression<'p, 'a> {
     problem: &'p WhitenedProblem<'a>,
     rows: ModelledRows,
     /// The same by each joint's travel.
@@ -42,7 +42,7 @@ pub(super) struct Solution {
     pub coefficients: Vec<f64>,
 }
 
-impl<'p, 'a> Regression<'p, 'a> {
+impl<'p, 'a> FormRegression<'p, 'a> {
     /// `jacobian` is that of the model, which has `forms` besides; `residual` is what it leaves without these.
     pub fn new(problem: &'p WhitenedProblem<'a>, jacobian: &Mat<f64>, forms: &[&Form], residual: &[f64]) -> Self {
         let base = orthonormal(jacobian);

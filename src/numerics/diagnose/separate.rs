@@ -1,6 +1,6 @@
 //! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should separate.
 
-use super::regression::{Regression, Solution};
+use super::regression::{FormRegression, Solution};
 use super::round::compliance;
 use super::table::forms_of;
 use super::types::Question;
@@ -47,7 +47,7 @@ pub fn discrimination_problem(
     let jacobian = problem.jacobian(&nuisances);
     let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let beside = Regression::new(&problem, &jacobian, &[], &open);
+    let beside = FormRegression::new(&problem, &jacobian, &[], &open);
     let others =
         rivals(&survey, &problem, model, (effect, place))?.into_iter().filter(|form| finding != std::slice::from_ref(form));
     let fitted = others.map(|form| (beside.solve(&form), form));
@@ -64,7 +64,7 @@ pub fn discrimination_problem(
 }
 
 /// How well one form fits, with a penalty for every parameter (Schwarz, 1978).
-fn score(beside: &Regression, of: &Solution) -> f64 {
+fn score(beside: &FormRegression, of: &Solution) -> f64 {
     let rows = beside.rows() as f64;
     rows * ((beside.square - of.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * of.rank as f64
 }

@@ -1,7 +1,7 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::placed;
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::STIFFNESS_BEYOND;
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -31,7 +31,7 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_compliance of joint 2, link_compliance of link 1",
     needs: "link masses",
     sentence: "the base tilts under the arm's weight by {value}",
-    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<TiltingBase> }),
+    motion: Some(OwnMotion { propose, sentence: None, read: Form::kept::<TiltingBase> }),
     ..Cause::PLAIN
 };
 

@@ -39,12 +39,12 @@ pub struct Cause {
     /// Another cause that does the same as a law of this one in whatever data: an identity of kinematics or statics.
     pub same: fn(&Term) -> Option<(&'static str, Place)>,
     /// The motion of a cause that is no product of the columns of laws.
-    pub motion: Option<MotionRow>,
+    pub motion: Option<OwnMotion>,
 }
 
 /// A motion with physics of its own.
 #[derive(Debug)]
-pub struct MotionRow {
+pub struct OwnMotion {
     /// Every hypothesis that a recording can speak of.
     pub propose: fn(&Survey) -> Vec<Hypothesis>,
     /// What a mechanic is told of a finding; `None`: what the row says.

@@ -6,7 +6,7 @@
 use super::form::placed;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, MotionRow, NumberSpec, ParameterSpec, Place,
+    ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, OwnMotion, ParameterSpec, Place,
     Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::STIFFNESS_BEYOND;
@@ -21,7 +21,7 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
     needs: "link masses, motor currents, or many postures",
     arm_effect: Some(of_all_joints),
-    motion: Some(MotionRow {
+    motion: Some(OwnMotion {
         propose,
         sentence: Some(sentence),
         read: |body| UnweighedWindup::read(&CAUSE, body).unwrap_or_else(|| Form::kept::<Windup>(body)),

@@ -3,7 +3,7 @@
 use super::form::placed;
 use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, MotionRow, NumberSpec, ParameterEstimate, Place,
+    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place,
     Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
@@ -52,7 +52,7 @@ pub(super) static CAUSE: Cause = Cause {
         rank: 7,
         advice: "measure with a third payload between none and full, and with joints near their largest load",
     }),
-    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<BentWindup> }),
+    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<BentWindup> }),
     ..Cause::PLAIN
 };
 

@@ -3,7 +3,7 @@
 
 use super::form::placed;
 use super::{
-    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, MotionRow, NumberSpec, Place, Placed, Summary, Survey, Variable,
+    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Summary, Survey, Variable,
     figure, names,
 };
 use crate::criteria::words::CLOCKS;
@@ -43,7 +43,7 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "backlash; viscous_windup where one joint moves alone",
     needs: "rows in the order of measurement; joint velocities",
     hidden: Some(|| HiddenSize { subject: Some("clocks"), may: "may be apart", least: *CLOCKS, unit: Unit::Millisecond }),
-    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<Lag> }),
+    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<Lag> }),
     of_the_measurement: true,
     separable_by_poses: false,
     ..Cause::PLAIN

@@ -2,7 +2,7 @@
 
 use super::form::placed;
 use super::motion::{SHORT, extent};
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -40,7 +40,7 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_compliance of either end",
     needs: "link masses",
     sentence: "{place} bends under what it carries by {value}",
-    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<BentLink> }),
+    motion: Some(OwnMotion { propose, sentence: None, read: Form::kept::<BentLink> }),
     ..Cause::PLAIN
 };
 

@@ -2,7 +2,7 @@
 
 use super::form::placed;
 use super::spring::{MEASURE, Spring};
-use super::{ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Survey, Variable, names};
+use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -26,7 +26,7 @@ pub(super) static CAUSE: Cause = Cause {
     needs: "link masses and motor currents",
     sentence: "the mass or centre of {place} in the torque model is wrong",
     measure: Some(MEASURE),
-    motion: Some(MotionRow { propose, sentence: None, read: Form::kept::<WrongLinkMass> }),
+    motion: Some(OwnMotion { propose, sentence: None, read: Form::kept::<WrongLinkMass> }),
     ..Cause::PLAIN
 };
 

@@ -5,8 +5,8 @@ use super::basis::around;
 use super::{Basis, Law, Survey, Term, Variable, figure};
 use crate::criteria::effect::{BENDS, RARE};
 
-/// Laws, each with how many like it are tried, and how much rarer it is than others.
-type Laws = Vec<(Law, usize, f64)>;
+/// RatedLaws, each with how many like it are tried, and how much rarer it is than others.
+type RatedLaws = Vec<(Law, usize, f64)>;
 
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
@@ -20,7 +20,7 @@ const SHORT: f64 = 2.0;
 const ROWS: usize = 5;
 
 /// The side that the load pushes the joint to, blurred over some torque.
-pub(super) fn by_load(joint: usize, survey: &Survey) -> Laws {
+pub(super) fn by_load(joint: usize, survey: &Survey) -> RatedLaws {
     if !survey.is_loaded(joint) {
         return Vec::new();
     }
@@ -30,7 +30,7 @@ pub(super) fn by_load(joint: usize, survey: &Survey) -> Laws {
 
 /// Friction of so many Nm decides under smaller loads, larger ones push the joint to their side; blurred over some torque.
 /// Positive: friction leaves the joint on the side to which it came; negative: it trails on the other one.
-pub(super) fn mixed(joint: usize, survey: &Survey) -> Laws {
+pub(super) fn mixed(joint: usize, survey: &Survey) -> RatedLaws {
     if !survey.is_loaded(joint) || !survey.both_directions(joint) {
         return Vec::new();
     }
@@ -91,7 +91,7 @@ pub(super) fn impossible(term: &Term, half_gap: f64, error: f64, survey: &Survey
 }
 
 /// Pre-sliding over travels that some moves are shorter than.
-pub(super) fn slip(joint: usize, survey: &Survey) -> Laws {
+pub(super) fn slip(joint: usize, survey: &Survey) -> RatedLaws {
     let shortly = |travel: &f64| {
         let moves = survey.rows.iter().map(|row| survey.data.last_move(*row, joint).abs());
         moves.filter(|moved| *moved > 0.0 && *moved < SHORT * travel).take(ROWS).count() == ROWS

@@ -51,7 +51,7 @@ mod words;
 pub use anchor::AnchorShift;
 pub use base_frame::BasePlacement;
 pub use basis::Basis;
-pub use cause::{ArmEffectOf, Cause, Measure, MotionRow, arm_effect, cause, identified};
+pub use cause::{ArmEffectOf, Cause, Measure, OwnMotion, arm_effect, cause, identified};
 pub use change::moved_with_the_payload;
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
 pub use deflection::{BeyondFitted, Deflection, Direction};

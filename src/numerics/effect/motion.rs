@@ -221,6 +221,9 @@ impl Motion {
             }
             Self::Bend { link } => {
                 let along = extent(robot, link);
+                if along.norm() <= SHORT {
+                    return;
+                }
                 let middle = robot.point(link) + 0.5 * along;
                 for (i, normal) in across(&along).iter().enumerate() {
                     out.shift(count * i + k, p, link + 1, screw(normal, &middle) * value);

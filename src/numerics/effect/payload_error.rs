@@ -3,7 +3,7 @@
 use super::form::placed;
 use super::spring::MEASURE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, MotionRow, NumberSpec, Place, Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::RARE;
 use crate::robot::{LoadCorrection, RobotModel};
@@ -31,7 +31,7 @@ pub(super) static CAUSE: Cause = Cause {
     confounded: "joint_hardening",
     needs: "rows with and without the payload",
     measure: Some(MEASURE),
-    motion: Some(MotionRow { propose, sentence: Some(sentence), read: Form::kept::<WrongPayload> }),
+    motion: Some(OwnMotion { propose, sentence: Some(sentence), read: Form::kept::<WrongPayload> }),
     ..Cause::PLAIN
 };
 

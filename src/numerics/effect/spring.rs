@@ -7,7 +7,7 @@
 use super::form::placed;
 use super::unknown::described;
 use super::{
-    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, MotionRow, NumberSpec, Place, Placed, Summary, Survey,
+    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey,
     Variable, names,
 };
 use crate::criteria::effect::UNCOMMON;
@@ -32,7 +32,7 @@ pub(super) static BALANCER: Cause = Cause {
     needs: "link masses and motor currents",
     sentence: "a balancer (spring or gas) acts on {place} and is missing from the torque model",
     measure: Some(MEASURE),
-    motion: Some(MotionRow {
+    motion: Some(OwnMotion {
         propose: |survey| Spring::propose(&BALANCER, survey, Spring::balances),
         sentence: None,
         read: |body| Spring::read(&BALANCER, body),
@@ -50,7 +50,7 @@ pub(super) static HOSE: Cause = Cause {
     confounded: "unknown, gear_cyclic of order 1",
     needs: "motor currents",
     measure: Some(MEASURE),
-    motion: Some(MotionRow {
+    motion: Some(OwnMotion {
         propose: |survey| Spring::propose(&HOSE, survey, |joint| !Spring::balances(joint)),
         sentence: Some(pulled),
         read: |body| Spring::read(&HOSE, body),

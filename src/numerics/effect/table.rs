@@ -2,7 +2,7 @@
 //! first is kept.
 //!
 //! A row says where its cause acts ([`At`]), what it follows there ([`Follows`]) and how rare it is; proposals, names of numbers, sentences,
-//! pages and `calib effects` are made from it. Motions with physics of their own stand in files of theirs, with a [`MotionRow`](super::MotionRow).
+//! pages and `calib effects` are made from it. Motions with physics of their own stand in files of theirs, with a [`OwnMotion`](super::OwnMotion).
 
 use super::Follows::{Angle, Constant, HalfWaves, Push, Side, Slip, Slow, Steady, Step, Velocity, Waves};
 use super::Warmth::{Temperature, WarmUp, Work};

@@ -19,7 +19,7 @@ mod tests {
     use crate::fixture;
     use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, Summary, Survey, arm_effect};
     use calib::estimate::{FitOptions, Model, fit};
-    use calib::robot::{Measurements, PointReadings};
+    use calib::robot::{Measurements, PointReadings, RobotModel};
     use calib::spatial::{Pose, Twist};
     use nalgebra::Vector3;
 

@@ -9,7 +9,7 @@ mod grammar;
 mod shape_sigma;
 
 use super::judge::{Alternatives, FoldErrors};
-use super::regression::Regression;
+use super::regression::FormRegression;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
@@ -49,7 +49,7 @@ impl FormulaSearch<'_, '_> {
         let (place, variables) = self.variables(finding)?;
         let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
         let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
-        let beside = Regression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
+        let beside = FormRegression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
         let Place::Joint(joint) = finding.place else { return None };
         let unit = if self.survey.robot.is_revolute(joint) { "rad" } else { "mm" };
         let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
@@ -126,7 +126,7 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
-    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &Regression) -> Option<Candidate> {
+    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &FormRegression) -> Option<Candidate> {
         let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
         let gains = beside.gains(&forms);
@@ -150,7 +150,7 @@ impl FormulaSearch<'_, '_> {
         &self,
         candidate: &Candidate,
         variables: &[NamedVariable],
-        beside: &Regression,
+        beside: &FormRegression,
         coefficients: Option<Vec<(f64, f64)>>,
     ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;

@@ -1,6 +1,6 @@
 //! How well shape numbers are known: by the curvature of what is left, with all coefficients fitted at every step.
 
-use crate::diagnose::regression::Regression;
+use crate::diagnose::regression::FormRegression;
 use crate::effect::Form;
 use nalgebra::DMatrix;
 
@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 const STEP: f64 = 1e-3;
 
 /// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
-pub(super) fn shape_sigmas(form: &Form, beside: &Regression) -> Vec<Option<f64>> {
+pub(super) fn shape_sigmas(form: &Form, beside: &FormRegression) -> Vec<Option<f64>> {
     let Some(declared) = form.declared() else { return Vec::new() };
     let steps = declared.shape_steps(STEP);
     let count = steps.len();

@@ -7,7 +7,7 @@ use super::declaration::EffectDeclaration;
 use super::pattern::DeclaredPattern;
 use super::seat::Seat;
 use crate::effect::sentence::filled;
-use crate::effect::{Cause, Form, Measure, MotionRow, Place, Summary, figure};
+use crate::effect::{Cause, Form, Measure, OwnMotion, Place, Summary, figure};
 use serde::de::Error as _;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, PoisonError};
@@ -56,7 +56,7 @@ impl DeclaredCause {
                 needs: stated(&declaration.needs, &needs),
                 of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
                 measure: declaration.advice.clone().map(|advice| Measure { rank: RANK, advice: kept(advice) }),
-                motion: Some(MotionRow { propose: |_| Vec::new(), sentence: Some(sentence), read: undeclared }),
+                motion: Some(OwnMotion { propose: |_| Vec::new(), sentence: Some(sentence), read: undeclared }),
                 ..Cause::PLAIN
             })),
             declaration,
