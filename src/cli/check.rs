@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Check whether a pipeline can run: what is left to fill in, what to look at, and every fault with its line.
 ///
 /// The robot file is read, and the headers of the data files: columns that are mapped and not there are named. Exit code 2 for faults of
-/// the YAML or of the robot file, 10 for those of the data files alone. Lines that `calib init` marked REPLACE (put your own there) or
+/// the YAML or of the robot file, 10 for those of the data files alone. Lines that `calib init` marked REPLACE (put your value there) or
 /// CHECK (look at it) come first; they are no faults, and a run does not wait for them. `--data` reads the recording and fits base and
 /// geometry to it: rows without partner, ranges, warnings of a wrong set-up, what will be observable.
 #[derive(Args)]

@@ -27,7 +27,8 @@ pub(super) struct ModelArguments {
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
-    /// Takes tables without a content hash, which another program wrote, as they are; a hash that does not hold is refused all the same
+    /// Takes tables without a content hash, which another program wrote, and tables of an earlier calib, which do not say which robot they
+    /// are the model of, as they are; a hash that does not hold is refused all the same
     #[arg(long)]
     unchecked: bool,
     /// Largest distance of the model's tool, or of a link or a joint's zero in mm, from the robot file's: a model beyond is refused

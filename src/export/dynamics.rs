@@ -1,8 +1,9 @@
 //! Friction, inertials and all other causes of the torques as one plain JSON document, with sigma.
 
-use super::friction::{ARMATURE, DAMPING, FRICTION, exponent, stands_alone};
+use super::friction::{ARMATURE, DAMPING, FRICTION, of_line, stands_alone};
 use super::{CarriedTorques, Export, Format};
-use crate::dynamics::{INERTIAL_NAMES, INERTIAL_NUMBERS};
+use crate::dynamics::{FittedNumber, INERTIAL_NAMES, INERTIAL_NUMBERS};
+use crate::effect::Place;
 use crate::error::{Error, Result};
 use crate::identified::IdentifiedTorques;
 use crate::table::TorqueParameterRow;
@@ -44,13 +45,26 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             .find(|curve| curve.joint == index)
             .map(|curve| json!({ "speed_rad_s": curve.velocity, "torque_nm": curve.torque, "sigma_nm": curve.sigma }));
         let seen = &model.range[index];
-        let mut viscous = of(DAMPING);
-        if let (Some(own), Some(exponent)) = (viscous.as_object_mut(), exponent(torques, index)) {
-            own.insert("unit".into(), json!("Nm (s/rad)^exponent"));
-            own.insert("exponent".into(), json!(exponent));
+        let (mut viscous, mut coulomb) = (of(DAMPING), of(FRICTION));
+        let own = |effect: &str| model.terms.iter().find(|term| term.effect == effect && term.place == Place::Joint(index));
+        for (effect, unit, number) in [(DAMPING, "Nm s/rad", &mut viscous), (FRICTION, "Nm", &mut coulomb)] {
+            let line = own(effect).and_then(|term| of_line(torques, term));
+            if let (Some(raw), Some(FittedNumber { value, sigma })) = (number.as_object_mut(), line) {
+                raw.extend(Map::from_iter([
+                    ("value".into(), json!(value)),
+                    ("unit".into(), json!(unit)),
+                    ("sigma".into(), json!(sigma)),
+                ]));
+            }
+        }
+        let power = rows(DAMPING).find(|row| row.place == place && row.form.is_some());
+        let exponent = own(DAMPING).and_then(|term| term.shape.first()).filter(|exponent| **exponent != 1.0);
+        if let (Some(own), Some(power), Some(exponent)) = (viscous.as_object_mut(), power, exponent) {
+            let law = json!({ "value": power.value, "unit": "Nm (s/rad)^exponent", "sigma": power.sigma, "exponent": exponent });
+            own.insert("law".into(), law);
         }
         json!({
-            "name": joint.name, "viscous": viscous, "coulomb": of(FRICTION), "friction": curve,
+            "name": joint.name, "viscous": viscous, "coulomb": coulomb, "friction": curve,
             "armature": of(ARMATURE), "reduction_ratio": joint.reduction_ratio, "motor_constant_nm_a": joint.motor_constant,
             "sign_width_rad_s": seen.sign_width,
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
@@ -82,7 +96,7 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             "SI; joints and links from 1, axes of the base at the zero pose; numbers of a link are {}, moments from its joint's point and \
              inertias about it, those of links that are not whole stand for others too; the last link carries the payload; torques are those \
              that the drives or sensors of the recording state; friction is the sum of all laws of speed at a joint, viscous and coulomb its parts \
-             where they stand alone",
+             where they stand alone: where one grows with another power of speed than the first (`law`), those of the straight line of both over the              recorded speeds",
             INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
         ),
         "sign_width_rad_s": model.sign_width,

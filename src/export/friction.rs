@@ -2,7 +2,7 @@
 
 use super::{CarriedTorques, Export};
 use crate::criteria::torque::NAMED;
-use crate::dynamics::{COULOMB, JointRange, TorqueTerm, line_of_power};
+use crate::dynamics::{COULOMB, FittedNumber, JointRange, TorqueTerm};
 use crate::effect::Place;
 use crate::identified::IdentifiedTorques;
 
@@ -12,8 +12,22 @@ pub(super) const FRICTION: &str = COULOMB;
 pub(super) const ARMATURE: &str = "rotor_inertia";
 pub(super) const DRIVE: &str = "torque_constant";
 
+/// The number of viscous or Coulomb friction that is of the line of both, where one of them grows with another power of speed.
+pub(super) fn of_line(torques: &IdentifiedTorques, term: &TorqueTerm) -> Option<FittedNumber> {
+    let Place::Joint(joint) = term.place else { return None };
+    let [viscous, coulomb] = torques.model.friction_line(joint).ok()??;
+    match term.effect.as_str() {
+        DAMPING => Some(viscous),
+        FRICTION => Some(coulomb),
+        _ => None,
+    }
+}
+
 /// Whether a cause stands alone: less than two standard deviations may as well be nothing, and friction that drives is a part of a sum.
 pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bool {
+    if let Some(FittedNumber { value, sigma }) = of_line(torques, term) {
+        return value > 0.0 && value >= *NAMED * sigma;
+    }
     let place = term.place.to_string();
     let mut own = torques.parameters.0.iter().filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
     let drives = [DAMPING, FRICTION].contains(&term.effect.as_str()) && term.coefficients[0] <= 0.0;
@@ -28,32 +42,17 @@ pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usiz
         return None;
     }
     let (value, seen) = (own.coefficients.first().copied()?, torques.model.range.get(joint)?);
-    let held = as_one_number(own, value, seen).map_or(value, |(held, _)| held);
-    // Dry friction beside a power of speed is that of the line of both.
-    let power =
-        torques.model.terms.iter().find(|term| term.effect == DAMPING && term.place == own.place).filter(|_| effect == FRICTION);
-    let beside = power.and_then(|power| Some(line_of_power(bent(power)?, seen.speed)[0] * power.coefficients.first()?));
-    Some(held + beside.unwrap_or(0.0))
+    let held = of_line(torques, own).map(|line| line.value);
+    Some(held.or_else(|| as_one_number(own, value, seen, None).map(|(held, _)| held)).unwrap_or(value))
 }
 
-/// The power of speed of viscous friction, where it is not 1.
-fn bent(term: &TorqueTerm) -> Option<f64> {
-    term.shape.first().copied().filter(|exponent| *exponent != 1.0)
-}
-
-/// The power of speed with which viscous friction of a joint (from 0) grows, where that is not 1.
-pub(super) fn exponent(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
-    let own = torques.model.terms.iter().find(|term| term.effect == DAMPING && term.place == Place::Joint(joint))?;
-    bent(own)
-}
-
-/// What formats of one number hold of a law that has a shape, and what must be said of it: friction that grows with another power of speed, and
-/// a torque constant that falls with torque: the straight line over the recorded speeds, and what is right at half of the greatest load.
-fn as_one_number(term: &TorqueTerm, value: f64, seen: &JointRange) -> Option<(f64, String)> {
+/// What formats of one number hold of a law that has a shape, and what must be said of it: of friction that grows with another power of speed
+/// its number of `line` over the recorded speeds, of a torque constant that falls with torque what is right at half of the greatest load.
+fn as_one_number(term: &TorqueTerm, value: f64, seen: &JointRange, line: Option<FittedNumber>) -> Option<(f64, String)> {
     let place = &term.place;
     match (term.effect.as_str(), *term.shape.first()?) {
-        (DAMPING, exponent) if exponent != 1.0 && seen.speed > 0.0 => {
-            let held = value * line_of_power(exponent, seen.speed)[1];
+        (DAMPING, exponent) if exponent != 1.0 => {
+            let held = line?.value;
             let law = format!("grows with the power {exponent:.2} of speed");
             let line = format!("{held:.4} Nm s/rad is written, the line up to {:.3} rad/s", seen.speed);
             Some((held, format!("{DAMPING} at {place} {law}: {line}")))
@@ -93,12 +92,15 @@ impl Export {
         };
         let holds = |term: &&TorqueTerm| {
             let named = matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());
-            named && stands_alone(torques, term) && (term.effect == DRIVE || term.coefficients[0] >= 0.0)
+            named
+                && stands_alone(torques, term)
+                && (term.effect == DRIVE || of_line(torques, term).is_some() || term.coefficients[0] >= 0.0)
         };
         let held = torques.model.terms.iter().filter(holds);
         lines.extend(held.filter_map(|term| {
             let Place::Joint(joint) = term.place else { return None };
-            Some(as_one_number(term, *term.coefficients.first()?, torques.model.range.get(joint)?)?.1)
+            let (value, seen) = (*term.coefficients.first()?, torques.model.range.get(joint)?);
+            Some(as_one_number(term, value, seen, of_line(torques, term))?.1)
         }));
         let left = torques.model.terms.iter().filter(|term| !holds(term));
         lines.extend(
@@ -126,14 +128,13 @@ mod tests {
     fn held(effect: &str, shape: &[f64], value: f64) -> Option<(f64, String)> {
         let (place, coefficients) = (Place::Joint(1), vec![value]);
         let term = TorqueTerm { effect: effect.into(), place, with: [0; 2], shape: shape.to_vec(), coefficients, rms: 1.0 };
-        as_one_number(&term, value, &SEEN)
+        as_one_number(&term, value, &SEEN, Some(FittedNumber { value: 3.3164, sigma: 0.1 }))
     }
 
     #[test]
     fn a_law_with_a_shape_is_written_as_one_number_and_with_a_word() {
-        // 4 |v|^0.8 up to 2 rad/s: the line through 2000 points of it, by plain least squares, rises by 3.3164 and begins at 0.5527.
         let (value, said) = held(DAMPING, &[0.8], 4.0).expect("a remark");
-        assert!((value - 3.3164).abs() < 1e-3, "{value}");
+        assert!((value - 3.3164).abs() < 1e-9, "{value}");
         assert!(said.starts_with("viscous_friction at joint 2 grows with the power 0.80 of speed: 3.31"), "{said}");
         assert!(said.ends_with("Nm s/rad is written, the line up to 2.000 rad/s"), "{said}");
         let (value, said) = held(DRIVE, &[20.0, 40.0], 0.2).expect("a remark");

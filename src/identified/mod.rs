@@ -77,7 +77,7 @@ pub struct Files {
     pub parameters: PathBuf,
     /// A robot file, or a table `robot`.
     pub robot: PathBuf,
-    /// Takes tables that carry no content hash.
+    /// Takes tables that carry no content hash, or do not say whose model they are.
     pub unchecked: bool,
 }
 
@@ -189,11 +189,13 @@ impl IdentifiedModel {
             Some(_) => Parameters::default(),
             None => files.vouched(&files.parameters, from_file::<Parameters>(&files.parameters)?, &mut warnings)?,
         };
-        if torques.is_none() && !parameters.says_its_robot() {
-            warnings.push(format!(
-                "{} does not say which robot it is the model of: an earlier calib wrote it",
-                files.parameters.display()
-            ));
+        if torques.as_ref().map_or(!parameters.says_its_robot(), |torques| !torques.table.says_its_robot()) {
+            let message = "does not say which robot it is the model of, as tables of an earlier calib do not";
+            if !files.unchecked {
+                let message = format!("{message}: identify anew, or take it as the model of this robot with --unchecked");
+                return Err(Error::data(files.parameters.display().to_string(), message));
+            }
+            warnings.push(format!("{} {message}", files.parameters.display()));
         }
         let robot = if ending(&files.robot) == "parquet" {
             let loose = from_file::<Robot>(&files.robot)?;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// What a recording of torques is read of, besides torques, currents and velocities.
 const BESIDE: [&str; 4] = ["time", "q", "usage", "temperature"];
-const OF_MOTORS: &str = "is it the torque at the joint? at the motor: `torque_side: motor` beside `files`";
+const OF_MOTORS: &str = "is it the torque at the joint? if at the motor: `torque_side: motor` next to `files`";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.

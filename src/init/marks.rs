@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// What `calib init` writes behind lines to look at, the label of such lines, and what is to be done there.
 const MARKS: [(&str, &str, &str); 2] = [
-    ("REPLACE", "replace", "put your own there and delete the mark"),
+    ("REPLACE", "replace", "put your value there and delete the mark"),
     ("CHECK", "check", "check that it is right and delete the mark"),
 ];
 

@@ -131,7 +131,7 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     let mut out = String::new();
     let mut put = |line: &str| out.push_str(&format!("          {line}\n"));
     if let Some(trouble) = &sheet.trouble {
-        put(&format!("# REPLACE what follows by the file's own columns: {}", one_line(trouble)));
+        put(&format!("# REPLACE what follows by the columns of the file: {}", one_line(trouble)));
     }
     if let Some(name) = &sheet.of_book {
         put(&format!("sheet: {}", quoted(name)));

@@ -110,7 +110,7 @@ pub(super) fn points(names: &[Name]) -> Points {
     } else if measured.is_empty() && !plain.is_empty() {
         if let (Some(difference), true) = (differences.first(), wanted.is_empty()) {
             found.ways.push(by(&plain[0], difference));
-            found.question = Some(format!("is this the measured point, or the target of the differences beside it ({sides})?"));
+            found.question = Some(format!("is this the measured point, or the target of the differences next to it ({sides})?"));
         } else if !plain[0].words.is_empty() && wanted.is_empty() {
             found.question = Some("is this the measured point, or the target?".into());
         }

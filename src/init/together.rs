@@ -146,7 +146,7 @@ fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
             file.state("usage", if k == 0 { "fit" } else { "validate" }, "every row of this file");
         }
     }
-    Joined { lines: vec!["      join: {by: append}      # CHECK: recordings of their own, one after the other".into()] }
+    Joined { lines: vec!["      join: {by: append}      # CHECK: separate recordings, one after the other".into()] }
 }
 
 /// Names and repeats of a file that stands alone.
@@ -172,7 +172,7 @@ fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     if both("x", one, two) {
         let first = two.get("q").is_some() && one.get("q").is_none();
         let (from, other) = if first { (two, &*one) } else { (one, &*two) };
-        let why = format!("the measured point, or the controller's own? that of {} is taken", other.name);
+        let why = format!("the measured point, or the controller's? that of {} is used", other.name);
         from.drop("x", &why);
     }
 }

@@ -39,8 +39,8 @@ pub fn number(cell: &[u8], mark: DecimalMark) -> Result<f64, NumberFault> {
         }
         None => cell,
     };
-    match std::str::from_utf8(plain).map(str::parse) {
-        Ok(Ok(value)) if f64::is_finite(value) && !is_pointed => Ok(value),
+    match fast_float2::parse::<f64, _>(plain) {
+        Ok(value) if value.is_finite() && !is_pointed => Ok(value),
         _ => unusual(cell, mark),
     }
 }

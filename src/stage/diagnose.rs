@@ -102,7 +102,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 34;
+    const IMPLEMENTATION: u32 = 35;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 

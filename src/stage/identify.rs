@@ -65,7 +65,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 17;
+    const IMPLEMENTATION: u32 = 18;
     type Reads = IdentifyReads;
     type Writes = Identified;
 

@@ -47,7 +47,7 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 13;
+    const IMPLEMENTATION: u32 = 14;
     type Reads = TransferReads;
     type Writes = Identified;
 

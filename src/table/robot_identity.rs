@@ -58,7 +58,7 @@ impl RobotIdentity {
     }
 }
 
-/// Gives a table the robot's columns, and refuses it for another robot; tables of earlier versions, which lack them, are of any.
+/// Gives a table the robot's columns, and refuses it for another robot; tables of earlier versions lack them.
 macro_rules! of_one_robot {
     ($table:ident, $kind:literal) => {
         impl $table {

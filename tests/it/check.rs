@@ -110,7 +110,7 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
     assert_eq!((code, err.as_str()), (0, ""));
     let lines: Vec<&str> = out.lines().collect();
     let told = [
-        "replace   1 line: put your own there and delete the mark",
+        "replace   1 line: put your value there and delete the mark",
         "          robot.yaml:2: name: arm   # REPLACE",
         "check     2 lines: check that it is right and delete the mark",
         "          pipeline.yaml:12: q: {column: \"q{j}\", unit: deg}   # CHECK: no value is beyond 6.5",

@@ -415,3 +415,15 @@ fn a_burden_is_that_of_the_forms_alone() {
         assert_eq!(format!("{load_correction:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
     });
 }
+
+#[test]
+fn only_a_coefficient_of_the_load_itself_is_per_newton_metre() {
+    let robot = RobotModel::new(fixture::offset_wrist());
+    let unit = |basis: Basis| {
+        let law = Law::of(Variable::Approach { joint: 1 }).times(Variable::Load { joint: 1 }, basis);
+        Form::from(Term::new(&Unknown, Motion::Joint { joint: 1 }, law)).parameters(&robot)[0].unit
+    };
+    assert_eq!(unit(Basis::PROPORTIONAL), Unit::RadianPerNewtonMetre);
+    assert_eq!(unit(Basis::Series { low: -10.0, high: 10.0, count: 4 }), Unit::Radian);
+    assert_eq!(unit(Basis::Linear { zero: 5.0, per: 10.0 }), Unit::Radian);
+}

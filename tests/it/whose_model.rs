@@ -2,6 +2,7 @@
 //! identified is the tool that goes out.
 
 use crate::compensate::{ROBOT, calib, cell};
+use crate::desk::shared;
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
@@ -21,7 +22,7 @@ fn said(folder: &Path, verb: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn a_model_is_refused_for_another_robot_and_an_older_table_says_that_it_cannot_tell() {
+fn a_model_is_refused_for_another_robot_and_so_is_a_table_that_does_not_say_whose_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     std::fs::copy(cell().join(".calib/tables/small").join(PARAMETERS), here.join(PARAMETERS)).expect("a table");
@@ -45,7 +46,7 @@ fn a_model_is_refused_for_another_robot_and_an_older_table_says_that_it_cannot_t
             assert!(told.contains(sentence), "{robot}: {told}");
         }
     }
-    // As an earlier calib wrote it.
+    // As an earlier calib wrote it, without a content hash.
     let mut table = from_file::<Parameters>(&here.join(PARAMETERS)).expect("a table").table;
     table.0.iter_mut().for_each(|row| (row.robot, row.kinematics) = (None, None));
     let frame = table.to_frame().expect("a frame");
@@ -53,9 +54,29 @@ fn a_model_is_refused_for_another_robot_and_an_older_table_says_that_it_cannot_t
     let mut writer = ArrowWriter::try_new(file, frame.batch().schema(), None).expect("a writer");
     writer.write(frame.batch()).expect("rows");
     writer.close().expect("a file");
-    let (code, _, told) = said(here, &["compensate", "older.parquet", "--unchecked", "--robot", "renamed.yaml"]);
-    assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains("does not say which robot it is the model of"), "{told}");
+    let unchecked = ["older.parquet", "--robot", "renamed.yaml", "--unchecked"];
+    for verb in [&["compensate"][..], &["export", "--format", "urdf"]] {
+        let (code, out, told) = said(here, &[verb, &unchecked[..3]].concat());
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+        let (code, _, told) = said(here, &[verb, &unchecked].concat());
+        assert_eq!(code, Some(0), "{told}");
+        assert!(told.contains("does not say which robot it is the model of"), "{told}");
+    }
+}
+
+#[test]
+fn a_table_that_does_not_say_whose_model_it_is_is_refused_for_either_robot_unless_someone_takes_it() {
+    let Some(fault) = shared("review/faults/two_robots") else { return };
+    let path = |name: &str| fault.join(name).display().to_string();
+    let [table, targets] = ["parameters.parquet", "tg.csv"].map(path);
+    for robot in ["irb.yaml", "kr6.yaml"].map(path) {
+        let ask = ["compensate", &table, "--robot", &robot, &targets];
+        let (code, out, told) = said(&fault, &ask);
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{told}");
+        assert!(told.contains("does not say which robot it is the model of") && told.contains("--unchecked"), "{told}");
+        let (code, _, told) = said(&fault, &[&ask[..], &["--unchecked"]].concat());
+        assert!(code == Some(0) && told.contains("does not say which robot it is the model of"), "{told}");
+    }
 }
 
 /// The URDF of a report: Link1's izz is 409 times ixx + iyy, Link2 has no moment about one axis.

@@ -8,7 +8,6 @@ use crate::robot::{Measurements, Memories, RowTime};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
-use std::ops::Range;
 
 /// Under which conditions a command will be carried out.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,14 +124,19 @@ impl IdentifiedArm {
 
 /// A law that a command takes beyond the rows that it was fitted to.
 pub(super) struct BeyondFitted {
-    /// Parameters of its form, in the stack.
-    pub parameters: Range<usize>,
+    /// First parameter of its form, in the stack.
+    pub parameter: usize,
     /// What it is a function of.
     pub variable: Variable,
-    /// By how much, as a share of the fitted range, at most 1.
-    pub share: f64,
-    /// What the form does to the point there, m, tracker frame.
-    pub displacement: Vector3<f64>,
+    /// What it may be off there: of the point, m2, tracker frame.
+    pub covariance: Matrix3<f64>,
+}
+
+impl BeyondFitted {
+    /// Its size squared, in any direction: what a law does there may have another direction than all of the correction.
+    pub fn square(&self) -> f64 {
+        self.covariance.trace()
+    }
 }
 
 /// One arm being placed.
@@ -182,20 +186,13 @@ impl Reach<'_> {
     pub(super) fn beyond_fitted(&mut self, q: &[f64]) -> Vec<BeyondFitted> {
         self.data.q.copy_from_slice(q);
         let Model { robot, stack, x, .. } = &self.arm.model;
-        let point = stack.point(robot, &self.data, 0, x, &mut self.scratch);
-        let beyond = stack.beyond(robot, &self.data, &self.scratch);
-        let mut without = x.clone();
-        let mut out = Vec::with_capacity(beyond.len());
-        for (parameters, variable, share) in beyond {
-            without[parameters.clone()].fill(0.0);
-            let displacement = point - stack.point(robot, &self.data, 0, &without, &mut self.scratch);
-            without[parameters.clone()].copy_from_slice(&x[parameters.clone()]);
-            // What belonged to the measurement moves no arm.
-            if displacement.norm() > 0.0 {
-                out.push(BeyondFitted { parameters, variable, share, displacement });
-            }
-        }
-        out
+        let motion = stack.point_motion(robot, &self.data, 0, x, &mut self.scratch);
+        let beyond = stack.beyond(robot, &self.data, x, &motion).into_iter();
+        // What belonged to the measurement moves no arm.
+        beyond
+            .filter(|(_, _, covariance)| covariance.trace() > 0.0)
+            .map(|(parameter, variable, covariance)| BeyondFitted { parameter, variable, covariance })
+            .collect()
     }
 
     /// Sum over the revolute joints of the outer products of the point's derivatives (m per rad, base frame) at command `q`.

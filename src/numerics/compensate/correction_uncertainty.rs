@@ -1,4 +1,4 @@
-//! How certain a correction is along its own direction, and which finding leaves it open.
+//! How certain a correction is, and which finding leaves it open.
 
 use super::arm::{BeyondFitted, IdentifiedArm, Reach};
 use super::uncertainty::Uncertainty;
@@ -21,12 +21,12 @@ const SEEN: f64 = 3.0;
 /// Below so many times what is usual where the arm was measured, an uncertainty refuses nothing, however small the correction.
 const USUAL: f64 = 6.0;
 
-/// How far a correction may be off along its own direction.
+/// How far a correction may be off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectionUncertainty {
     /// m: the correction at the uncorrected command.
     pub correction: f64,
-    /// m, 95 %: by the parameters, and by laws that are used beyond the rows that they were fitted to.
+    /// m, 95 %: along the correction by the parameters, and in any direction by laws that are used beyond the rows that they were fitted to.
     pub u95: f64,
     /// The effect and place that most of it comes from, where one stands out.
     pub finding: Option<String>,
@@ -73,16 +73,15 @@ impl Uncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q);
         let size = correction.norm();
         let along = if size > NOTHING { correction / size } else { Vector3::zeros() };
-        let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
         let jacobian = self.along(reach, q, &along);
-        let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
-        let seen = |one: &&BeyondFitted| COVERAGE * one.share * one.displacement.norm() > self.instrument;
-        let named = |one: &BeyondFitted| (self.name(one.parameters.start), one.variable.to_string());
+        let variance = self.variance(&jacobian) + beyond.iter().map(BeyondFitted::square).sum::<f64>();
+        let seen = |one: &&BeyondFitted| COVERAGE * one.square().sqrt() > self.instrument;
+        let named = |one: &BeyondFitted| (self.name(one.parameter), one.variable.to_string());
         let u95 = COVERAGE * variance.sqrt();
         let mut finding = None;
         if u95 > DOUBTFUL * size {
             let mut shares = self.by_effect(&jacobian);
-            shares.extend(beyond.iter().map(|one| (self.name(one.parameters.start), by_range(one))));
+            shares.extend(beyond.iter().map(|one| (self.name(one.parameter), one.square())));
             let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
             finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
         }

@@ -118,8 +118,7 @@ impl Uncertainty {
         let Scatter { unexplained, repeatability } = self.scatter;
         let mut all = parameters + Matrix3::from_diagonal_element(unexplained * unexplained);
         for law in reach.beyond_fitted(q) {
-            let off = law.share * law.displacement;
-            all += off * off.transpose();
+            all += law.covariance;
         }
         if repeatability > 0.0 {
             all += reach.joint_scatter(q) * (repeatability * repeatability);

@@ -23,4 +23,6 @@ criteria! {
     WOBBLES: usize = 12, "forms", "count: two tilts of six orders", "";
     /// Bends of a wind-up, and thresholds of lost motion.
     BENDS: usize = 10, "forms", "count: ten laws are proposed", "";
+    /// Standard deviation of what a spring does under loads beyond those of the fitted rows, where these are twice as large.
+    STIFFNESS_BEYOND: f64 = 0.5, "share of the deflection", "physics: stiffnesses change by 5 to 50 % over a load", "";
 }

@@ -27,6 +27,8 @@ criteria! {
     SCREENED: usize = 60, "rows", "judgement: bounds time", "";
     /// A zero that is this near to quarter turns is counted from there, whatever it is off by beyond that.
     QUARTERLY: f64 = 5.0, "deg", "physics: zeros are mastered to degrees at worst", "";
+    /// Between these the largest angle of an arm's joints lies, in the right unit.
+    TURNS: [f64; 2] = [5.0, 720.0], "deg", "physics: arms that are calibrated move, joints turn twice either way at most", "";
     /// Countings that are placed.
     COUNTINGS: usize = 16, "countings", "count: mirror images and turned wrists of one counting, twice", "";
     /// What no arm's length is off by when it is made, as a share of itself.

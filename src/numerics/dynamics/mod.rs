@@ -75,7 +75,7 @@ mod used;
 mod weighted;
 
 pub use arm::{DynamicArm, Inertial, InertialTolerance};
-pub use cause::{COULOMB, line_of_power};
+pub use cause::{COULOMB, FittedNumber};
 pub use changes::{DiagnosedRecording, TorqueChange, TorqueChanges, changes};
 pub use consistency::{BodyConsistency, inertial_numbers};
 pub use excite::{ExciteRequest, ExcitingMotion, ExpectedSigma, excite};

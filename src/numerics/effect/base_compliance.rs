@@ -2,6 +2,7 @@
 
 use super::form::placed;
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
+use crate::criteria::effect::STIFFNESS_BEYOND;
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -40,6 +41,15 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
     forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
 }
 
+impl TiltingBase {
+    /// The point about which it tilts, m, and the moment about that, Nm.
+    fn moment(&self, robot: &RobotModel, state: &ArmState) -> (Vector3<f64>, Vector3<f64>) {
+        let down = Vector3::from(robot.description().gravity);
+        let pivot = down.try_normalize(0.0).unwrap_or_default() * self.below;
+        (pivot, state.posture.moment(0, &pivot))
+    }
+}
+
 impl Placed for TiltingBase {
     placed! { self: Place::Base, &CAUSE, [Variable::ArmLoad], self }
 
@@ -55,8 +65,7 @@ impl Placed for TiltingBase {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let down = Vector3::from(robot.description().gravity);
-        let pivot = down.try_normalize(0.0).unwrap_or_default() * self.below;
-        let moment = state.posture.moment(0, &pivot);
+        let (pivot, moment) = self.moment(robot, state);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         // The two base axes that gravity has least of.
         let vertical = axes.iter().enumerate().max_by(|a, b| down.dot(a.1).abs().total_cmp(&down.dot(b.1).abs()));
@@ -65,6 +74,14 @@ impl Placed for TiltingBase {
             let tilt = screw(&(axes[axis] * moment[axis]), &pivot);
             out.shift(if self.two { k } else { 0 }, p, 0, tilt);
         }
+    }
+
+    fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
+        vec![Some(self.moment(robot, state).1.norm())]
+    }
+
+    fn doubt(&self) -> f64 {
+        *STIFFNESS_BEYOND
     }
 
     fn needs_torque(&self) -> bool {

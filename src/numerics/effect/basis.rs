@@ -1,7 +1,7 @@
 //! Functions of one variable, linear in their coefficients, with few shape numbers (in the variable's SI unit).
 
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 /// A function of one variable, or a few.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -115,6 +115,22 @@ impl Basis {
         matches!(self, Self::Cosines { .. } | Self::Series { .. })
     }
 
+    /// What a function may be off (one standard deviation, for a coefficient of 1) where the variable is `off` beyond the fitted range, which
+    /// is `share` of that, and the function has `value`.
+    ///
+    /// A curve is held at the end of its range: a smooth one of its spectrum departs from that by p sqrt(1 - cos(k pi off / width)) up to where
+    /// it knows nothing of it. All else may be off by what it is, one range beyond.
+    pub(super) fn off(&self, k: usize, value: f64, off: f64, share: f64) -> f64 {
+        match *self {
+            Self::Cosines { low, high, .. } => departure(k + 1, off / (high - low)),
+            Self::Series { low, high, .. } => departure(k, off / (high - low)),
+            // Sine and cosine together are their size whatever the phase.
+            Self::Wave { .. } | Self::Sway { .. } => share * FRAC_1_SQRT_2,
+            Self::Straight { .. } if k == 0 => 0.0,
+            _ => share * value.abs(),
+        }
+    }
+
     /// The values of its functions at `u`, numbered.
     pub(crate) fn at(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
         match *self {
@@ -159,6 +175,14 @@ impl Basis {
     }
 }
 
+/// Root mean square of what a cosine of a phase that is not known departs from itself over a share of its range, at most 1.
+fn departure(order: usize, share: f64) -> f64 {
+    if order == 0 {
+        return 0.0;
+    }
+    (1.0 - libm::cos(PI * (order as f64 * share).min(0.5))).sqrt()
+}
+
 /// Cosines of `u` held within the range, see [`Basis::Cosines`].
 pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
     let phase = PI * ((u - low) / (high - low).max(1e-12)).clamp(0.0, 1.0);
@@ -185,5 +209,18 @@ mod tests {
             let value = cosines(u, [0.0, PI], order).last().expect("one");
             assert!((value - libm::cos(order as f64 * u)).abs() < 1e-13, "{u} {order}");
         }
+    }
+
+    #[test]
+    fn beyond_its_range_a_rough_curve_knows_nothing_soon_and_a_smooth_one_later() {
+        let curve = Basis::Cosines { low: 0.0, high: 2.0, count: 6 };
+        let off = |basis: Basis, k: usize, value: f64, off: f64| basis.off(k, value, off, 0.5 * off);
+        // A quarter of the support: sqrt(1 - cos 45 deg); the fourth cosine is at a right angle already.
+        assert!((off(curve, 0, 0.3, 0.5) - 0.541_196_1).abs() < 1e-7);
+        assert_eq!([off(curve, 3, 0.3, 0.5), off(curve, 5, 0.0, 9.0), off(curve, 0, 0.3, 0.0)], [1.0, 1.0, 0.0]);
+        let series = Basis::Series { low: 0.0, high: 2.0, count: 6 };
+        assert_eq!([off(series, 0, 1.0, 9.0), off(series, 4, 0.0, 0.5)], [0.0, 1.0]);
+        assert!((off(Basis::Wave { order: 3, overtone: false }, 1, 0.0, 1.0) - 0.5 * FRAC_1_SQRT_2).abs() < 1e-12);
+        assert!((off(Basis::PROPORTIONAL, 0, -2.0, 0.6) - 0.6).abs() < 1e-12);
     }
 }

@@ -47,6 +47,35 @@ pub struct Deflection {
     kept: Kept,
 }
 
+/// What a form may be off beyond the rows that it was fitted to: groups of motions, each group with a factor of one standard deviation.
+pub struct BeyondFitted {
+    /// Their directions, by the parameters of the form.
+    pub motions: Deflection,
+    ends: Vec<(usize, f64)>,
+}
+
+impl BeyondFitted {
+    pub(super) fn new(joints: usize) -> Self {
+        Self { motions: Deflection::new(joints), ends: Vec::new() }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.motions.clear();
+        self.ends.clear();
+    }
+
+    /// Ends a group: what was moved since the one before is off together, by `factor` times its size.
+    pub fn close(&mut self, factor: f64) {
+        self.ends.push((self.motions.partials.len(), factor));
+    }
+
+    /// The groups: factor, and (parameter, direction) of each motion.
+    pub(super) fn groups(&self) -> impl Iterator<Item = (f64, &[(usize, Direction)])> {
+        let starts = std::iter::once(0).chain(self.ends.iter().map(|(end, _)| *end));
+        starts.zip(&self.ends).map(|(start, (end, factor))| (*factor, &self.motions.partials[start..*end]))
+    }
+}
+
 /// Sums at [`Deflection::keep`].
 #[derive(Debug, Clone, Default)]
 struct Kept {

@@ -3,7 +3,8 @@
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
 use super::{
-    ArmState, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term, Variable, cause,
+    ArmState, BeyondFitted, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term,
+    Variable, cause,
 };
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use crate::units::Unit;
@@ -74,9 +75,38 @@ pub trait Placed: Send + Sync {
     fn of_one_size(&self) -> Vec<usize> {
         Vec::new()
     }
-    /// The same with its laws held at the ends of what the fitted rows have of their variables; itself where it has none.
-    fn held_within(&self, _range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {
+    /// The numbers of a row that its variables are, in their order; none of what is no single number, or is not known.
+    fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
+        self.variables().into_iter().map(|of| of.value(0, robot, state).filter(|_| of.is_single())).collect()
+    }
+    /// The same with its laws held at the ends of what the fitted rows have of its variables, in their order; none where they go on.
+    fn held_within(&self, _ranges: &[Option<[f64; 2]>]) -> Option<Form> {
         None
+    }
+    /// What it may be off (one standard deviation) in a row beyond what the fitted rows have of its variables, `within`, and the variable
+    /// that is most so; none inside.
+    fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        p: &[f64],
+        within: &[Option<[f64; 2]>],
+        out: &mut BeyondFitted,
+    ) -> Option<Variable> {
+        let (of, share) = self.most_beyond(robot, state, within)?;
+        self.deflect(robot, state, p, &mut out.motions);
+        out.close(share * self.doubt());
+        Some(of)
+    }
+    /// The variable that a row takes furthest beyond its fitted range, and by what share of that, at most 1; none inside.
+    fn most_beyond(&self, robot: &RobotModel, state: &ArmState, within: &[Option<[f64; 2]>]) -> Option<(Variable, f64)> {
+        let sizes = self.variables().into_iter().zip(self.sizes(robot, state)).zip(within);
+        let shares = sizes.filter_map(|((of, size), range)| Some((of, of.share_beyond(size?, (*range)?))));
+        shares.filter(|(_, share)| *share > 0.0).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+    /// Standard deviation of what it does where its variables are one range beyond the fitted one, as a share of that.
+    fn doubt(&self) -> f64 {
+        1.0
     }
     /// The law, where it is one at a place.
     fn term(&self) -> Option<&Term> {
@@ -125,17 +155,21 @@ pub(super) use placed;
 
 /// A form of any cause.
 #[derive(Clone)]
-pub struct Form(Arc<dyn Placed>);
+pub struct Form {
+    placed: Arc<dyn Placed>,
+    /// What the fitted rows have of each of its variables (SI), where its laws go on beyond; empty while it is sought.
+    within: Vec<Option<[f64; 2]>>,
+}
 
 impl<T: Placed + 'static> From<T> for Form {
     fn from(form: T) -> Self {
-        Self(Arc::new(form))
+        Self { placed: Arc::new(form), within: Vec::new() }
     }
 }
 
 impl PartialEq for Form {
     fn eq(&self, other: &Self) -> bool {
-        if Arc::ptr_eq(&self.0, &other.0) {
+        if Arc::ptr_eq(&self.placed, &other.placed) {
             return true;
         }
         match ((self.term(), other.term()), (self.declared(), other.declared())) {
@@ -157,7 +191,7 @@ impl std::ops::Deref for Form {
     type Target = dyn Placed;
 
     fn deref(&self) -> &Self::Target {
-        &*self.0
+        &*self.placed
     }
 }
 
@@ -185,6 +219,17 @@ impl Form {
         T::deserialize(body).map(Self::from)
     }
 
+    /// The same, fitted to rows that have these ranges of its variables.
+    pub(super) fn fitted_within(&self, ranges: Vec<Option<[f64; 2]>>) -> Self {
+        let held = self.held_within(&ranges);
+        held.unwrap_or_else(|| Self { placed: self.placed.clone(), within: ranges })
+    }
+
+    /// See [`Placed::beyond`].
+    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut BeyondFitted) -> Option<Variable> {
+        self.placed.beyond(robot, state, p, &self.within, out)
+    }
+
     /// Effect, place and variant: see [`Placed::variant`].
     pub fn key(&self) -> String {
         format!("{}@{}#{}", self.name(), self.place(), self.variant())
@@ -199,16 +244,26 @@ impl Form {
     }
 }
 
+/// Key of a form's ranges beside its place and shape.
+const WITHIN: &str = "within";
+
 impl Serialize for Form {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        BTreeMap::from([(self.cause().name(), self.body())]).serialize(serializer)
+        let mut body = self.body();
+        if let Some(body) = body.as_object_mut().filter(|_| self.within.iter().any(Option::is_some)) {
+            body.insert(WITHIN.into(), serde_json::json!(self.within));
+        }
+        BTreeMap::from([(self.cause().name(), body)]).serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for Form {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
-        let [(name, body)] = <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
+        let [(name, mut body)] =
+            <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
+        let within = body.as_object_mut().and_then(|body| body.remove(WITHIN));
+        let within = within.map_or(Ok(Vec::new()), serde_json::from_value).map_err(D::Error::custom)?;
         let form = match cause(&name) {
             Some(cause) => match &cause.motion {
                 Some(motion) => (motion.read)(&body),
@@ -216,7 +271,7 @@ impl<'de> Deserialize<'de> for Form {
             },
             None => DeclaredForm::read(&name, body),
         };
-        form.map_err(D::Error::custom)
+        Ok(Self { within, ..form.map_err(D::Error::custom)? })
     }
 }
 
@@ -228,24 +283,24 @@ impl Effect for Form {
         Self::parameters(self, robot)
     }
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        self.0.deflect(robot, state, p, out);
+        self.placed.deflect(robot, state, p, out);
     }
     fn needs_torque(&self) -> bool {
-        self.0.needs_torque()
+        self.placed.needs_torque()
     }
     fn needs_current(&self) -> bool {
-        self.0.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
+        self.placed.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
     }
     fn needs_sight(&self) -> bool {
-        self.0.needs_sight()
+        self.placed.needs_sight()
     }
     fn load_correction(&self, q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
-        self.0.load_correction(q, payload, p, out);
+        self.placed.load_correction(q, payload, p, out);
     }
     fn form(&self) -> Option<&Form> {
         Some(self)
     }
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
-        self.0.missing(robot, data)
+        self.placed.missing(robot, data)
     }
 }

@@ -9,6 +9,7 @@ use super::{
     ArmState, Cause, Deflection, Effect, EffectContext, Form, Hypothesis, Load, NumberSpec, OwnMotion, ParameterSpec, Place,
     Placed, Summary, Survey, Variable, names,
 };
+use crate::criteria::effect::STIFFNESS_BEYOND;
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +82,14 @@ impl Placed for Windup {
         self.wind_up(0, state, p, out);
     }
 
+    fn sizes(&self, _robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
+        vec![Some(self.load_of(state))]
+    }
+
+    fn doubt(&self) -> f64 {
+        *STIFFNESS_BEYOND
+    }
+
     fn needs_torque(&self) -> bool {
         self.load == Load::GravityTorque
     }
@@ -105,16 +114,20 @@ impl Placed for Windup {
 }
 
 impl Windup {
-    /// Adds the turn of its joint by coefficient number `parameter` of `p`.
-    fn wind_up(&self, parameter: usize, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let load = match self.load {
+    /// Nm or A.
+    fn load_of(&self, state: &ArmState) -> f64 {
+        match self.load {
             Load::GravityTorque => state.torque()[self.joint],
             Load::MotorCurrent => match state.current().map(|all| all[self.joint]) {
                 Some(current) if current.is_finite() => current,
                 _ => 0.0,
             },
-        };
-        out.turn(parameter, p, self.joint, load);
+        }
+    }
+
+    /// Adds the turn of its joint by coefficient number `parameter` of `p`.
+    fn wind_up(&self, parameter: usize, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        out.turn(parameter, p, self.joint, self.load_of(state));
         if self.load == Load::GravityTorque {
             out.yields(self.joint, p[parameter]);
         }

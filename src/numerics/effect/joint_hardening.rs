@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place, Placed, Summary,
-    Survey, Variable, figure, names,
+    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place,
+    Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -96,6 +96,18 @@ fn least_bend(survey: &Survey, joint: usize) -> f64 {
 }
 
 impl BentWindup {
+    /// What each number turns the joint by under a torque, per unit.
+    fn rates(&self, torque: f64) -> Vec<f64> {
+        match self.law {
+            HardeningLaw::Curve { most_nm } => {
+                let quarter = FRAC_PI_2 * (torque / most_nm).clamp(-1.0, 1.0);
+                let sines = (0..CURVE).map(|k| libm::sin((2 * k + 1) as f64 * quarter));
+                std::iter::once(torque).chain(sines).collect()
+            }
+            _ => vec![torque, self.bend(torque).0],
+        }
+    }
+
     /// f and its slope.
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
@@ -131,18 +143,30 @@ impl Placed for BentWindup {
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let torque = state.torque()[self.joint];
-        out.turn(0, p, self.joint, torque);
-        if let HardeningLaw::Curve { most_nm } = self.law {
-            let quarter = FRAC_PI_2 * (torque / most_nm).clamp(-1.0, 1.0);
-            for k in 0..CURVE {
-                out.turn(k + 1, p, self.joint, libm::sin((2 * k + 1) as f64 * quarter));
-            }
-            out.yields(self.joint, p[0]);
-        } else {
-            let (value, slope) = self.bend(torque);
-            out.turn(1, p, self.joint, value);
-            out.yields(self.joint, p[0] + p[1] * slope);
-        }
+        self.rates(torque).into_iter().enumerate().for_each(|(k, rate)| out.turn(k, p, self.joint, rate));
+        let bend = if let HardeningLaw::Curve { .. } = self.law { 0.0 } else { p[1] * self.bend(torque).1 };
+        out.yields(self.joint, p[0] + bend);
+    }
+
+    /// Both what it is at the end of its range and what it adds beyond: a law that levels off there may go on, and one that goes on level off.
+    fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        p: &[f64],
+        within: &[Option<[f64; 2]>],
+        out: &mut BeyondFitted,
+    ) -> Option<Variable> {
+        let (of, share) = self.most_beyond(robot, state, within)?;
+        let (torque, [low, high]) = (state.torque()[self.joint], within.first().copied().flatten()?);
+        let [end, now] = [torque.clamp(low.min(0.0), high.max(0.0)), torque].map(|torque| self.rates(torque));
+        let mut add = |rates: Vec<f64>, factor: f64| {
+            rates.into_iter().enumerate().for_each(|(k, rate)| out.motions.turn(k, p, self.joint, rate));
+            out.close(factor * *effect::STIFFNESS_BEYOND);
+        };
+        add(now.iter().zip(&end).map(|(now, end)| now - end).collect(), 1.0);
+        add(end, share);
+        Some(of)
     }
 
     fn needs_torque(&self) -> bool {

@@ -47,18 +47,33 @@ impl Factor {
         u.clamp(low - further, high + further)
     }
 
-    /// By how much the variable is beyond the fitted range in a row, as a share of that range, at most 1; 0 inside.
-    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> f64 {
-        let (Some([low, high]), Some(u)) = (self.within, self.of.value(0, robot, state)) else { return 0.0 };
-        match self.basis {
-            // A step has happened.
-            Basis::After { .. } => return 0.0,
-            // What had not yet settled when the recording ended.
-            Basis::Settling { start, constant } if u > high => return libm::exp(-(high - start).max(0.0) / constant),
-            _ => {}
-        }
+    /// By how much the variable is beyond the fitted range in a row, SI and as a share of that range, at most 1; none inside.
+    fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(f64, f64)> {
+        let ([low, high], u) = (self.within?, self.of.value(0, robot, state)?);
         let off = (low - u).max(u - high).max(0.0);
-        if off == 0.0 { 0.0 } else { (off / (high - low)).min(1.0) }
+        let share = match self.basis {
+            // A step has happened.
+            Basis::After { .. } => 0.0,
+            // What had not yet settled when the recording ended.
+            Basis::Settling { start, constant } if u > high => libm::exp(-(high - start).max(0.0) / constant),
+            _ if off == 0.0 => 0.0,
+            _ => (off / (high - low)).min(1.0),
+        };
+        (share > 0.0).then_some((off, share))
+    }
+
+    /// The values of its functions in a row; zeros where the row does not tell.
+    fn all(&self, robot: &RobotModel, state: &ArmState) -> Vec<f64> {
+        let mut out = vec![0.0; self.count()];
+        self.values(robot, state, &mut |k, value| out[k] = value);
+        out
+    }
+
+    /// What each function may be off there, one standard deviation, and by what share of its range the variable is beyond; none inside.
+    fn off(&self, robot: &RobotModel, state: &ArmState) -> Option<(Vec<f64>, f64)> {
+        let (off, share) = self.beyond(robot, state)?;
+        let values = self.all(robot, state).into_iter().enumerate();
+        Some((values.map(|(k, value)| self.basis.off(k, value, off, share)).collect(), share))
     }
 
     /// How many functions it has.
@@ -131,6 +146,31 @@ impl Law {
         self.factors().map(|factor| factor.of).collect()
     }
 
+    /// In a row beyond the fitted range of a variable: that variable, and what the law may be off, groups of (function, by how much) that
+    /// are independent of each other, one standard deviation each. None inside.
+    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(Variable, Vec<Vec<(usize, f64)>>)> {
+        let first = self.first.off(robot, state);
+        let Some(times) = &self.times else {
+            let (off, _) = first?;
+            return Some((self.first.of, off.into_iter().enumerate().map(|one| vec![one]).collect()));
+        };
+        let second = times.off(robot, state);
+        let share = |off: &Option<(Vec<f64>, f64)>| off.as_ref().map_or(0.0, |(_, share)| *share);
+        let (a, b) = (share(&first), share(&second));
+        let most = if a >= b { self.first.of } else { times.of };
+        let inner = times.count();
+        let mut groups = Vec::new();
+        for (i, off) in first.into_iter().flat_map(|(off, _)| off).enumerate() {
+            let others = times.all(robot, state).into_iter().enumerate();
+            groups.push(others.map(|(k, value)| (inner * i + k, off * value)).collect());
+        }
+        for (k, off) in second.into_iter().flat_map(|(off, _)| off).enumerate() {
+            let others = self.first.all(robot, state).into_iter().enumerate();
+            groups.push(others.map(|(i, value)| (inner * i + k, off * value)).collect());
+        }
+        (a + b > 0.0).then_some((most, groups))
+    }
+
     /// The values of its functions in a row, numbered; zeros where the row does not tell.
     pub(super) fn values(&self, robot: &RobotModel, state: &ArmState, each: &mut dyn FnMut(usize, f64)) {
         match &self.times {
@@ -187,7 +227,7 @@ links:
         let state = ArmState::new(&data, 0, &posture, Vector3::new(2.0 + payload, 0.0, 0.0));
         let mut sum = 0.0;
         factor.values(&robot, &state, &mut |_, value| sum += value);
-        (sum, factor.beyond(&robot, &state))
+        (sum, factor.beyond(&robot, &state).map_or(0.0, |(_, share)| share))
     }
 
     #[test]

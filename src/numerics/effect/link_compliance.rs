@@ -3,7 +3,7 @@
 use super::form::placed;
 use super::motion::{SHORT, extent};
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
-use crate::criteria::effect::{RARE, UNLIKELY};
+use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -58,6 +58,14 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
         .collect()
 }
 
+impl BentLink {
+    /// The middle of the link, m, and the moment about that, Nm.
+    fn moment(&self, robot: &RobotModel, state: &ArmState) -> (Vector3<f64>, Vector3<f64>) {
+        let middle = robot.point(self.link) + extent(robot, self.link) * 0.5;
+        (middle, state.posture.moment(self.link + 1, &middle))
+    }
+}
+
 impl Placed for BentLink {
     placed! { self: Place::Links(self.link, self.link), &CAUSE, [Variable::ArmLoad], self }
 
@@ -73,9 +81,8 @@ impl Placed for BentLink {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let along = extent(robot, self.link);
-        let middle = robot.point(self.link) + along * 0.5;
         let station = self.link + 1;
-        let moment = state.posture.moment(station, &middle);
+        let (middle, moment) = self.moment(robot, state);
         let without = |direction: &Vector3<f64>| moment - direction * direction.dot(&moment);
         match self.bending {
             Bending::AcrossLink => out.shift(0, p, station, screw(&without(&along.normalize()), &middle)),
@@ -86,6 +93,14 @@ impl Placed for BentLink {
                 }
             }
         }
+    }
+
+    fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
+        vec![Some(self.moment(robot, state).1.norm())]
+    }
+
+    fn doubt(&self) -> f64 {
+        *STIFFNESS_BEYOND
     }
 
     fn needs_torque(&self) -> bool {

@@ -7,13 +7,14 @@
 use super::form::placed;
 use super::unknown::described;
 use super::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey, Variable,
-    names,
+    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey,
+    Variable, names,
 };
 use crate::criteria::effect::UNCOMMON;
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// What separates the numbers of the torque model.
 pub(super) const MEASURE: Measure = Measure {
@@ -124,6 +125,23 @@ impl Placed for Spring {
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         self.waves(state.q).enumerate().for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
+    }
+
+    /// Sine and cosine together are their size whatever the phase.
+    fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        _p: &[f64],
+        within: &[Option<[f64; 2]>],
+        out: &mut BeyondFitted,
+    ) -> Option<Variable> {
+        let (of, share) = self.most_beyond(robot, state, within)?;
+        for k in 0..2 * self.shape.orders as usize {
+            out.motions.load(k, self.shape.joint, FRAC_1_SQRT_2);
+            out.close(share);
+        }
+        Some(of)
     }
 
     fn needs_torque(&self) -> bool {

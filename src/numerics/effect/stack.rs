@@ -3,10 +3,10 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, from_anchor};
-use super::{ArmState, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
+use super::{ArmState, BeyondFitted, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
-use nalgebra::{Matrix3x6, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Vector3};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -40,45 +40,49 @@ impl EffectStack {
 
     /// The same stack with the laws of its forms held at the ends of what some rows have of their variables.
     pub(crate) fn held_within(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], x: &[f64]) -> Self {
-        let forms = || self.effects.iter().filter_map(|(effect, _)| effect.form());
-        let terms = || forms().filter_map(|form| form.term());
-        let variables: Vec<Variable> = terms().flat_map(|term| term.law().factors()).map(|factor| factor.of).collect();
-        let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; variables.len()];
+        let mut ranges: Vec<Vec<Option<[f64; 2]>>> = vec![Vec::new(); self.effects.len()];
         let mut scratch = self.scratch(robot);
         for row in rows {
             let point = self.place(robot, data, *row, x, &mut scratch).point;
             let state = ArmState::new(data, *row, &scratch.posture, point);
-            for (variable, [low, high]) in variables.iter().zip(&mut ranges) {
-                if let Some(value) = variable.value(0, robot, &state).filter(|value| value.is_finite()) {
-                    (*low, *high) = (low.min(value), high.max(value));
+            for ((effect, _), ranges) in self.effects.iter().zip(&mut ranges) {
+                let sizes = effect.form().map_or_else(Vec::new, |form| form.sizes(robot, &state));
+                ranges.resize(sizes.len(), None);
+                for (size, range) in sizes.into_iter().zip(ranges) {
+                    if let Some(size) = size.filter(|size| size.is_finite()) {
+                        *range = Some(range.map_or([size; 2], |[low, high]| [low.min(size), high.max(size)]));
+                    }
                 }
             }
         }
-        let range = |variable: Variable| variables.iter().zip(&ranges).find(|(of, _)| **of == variable).map(|(_, range)| *range);
-        let held = |effect: &Arc<dyn Effect>| -> Arc<dyn Effect> {
-            let form = effect.form().and_then(|form| form.held_within(&range));
-            form.map_or_else(|| effect.clone(), |form| Arc::new(form))
+        let held = |effect: &Arc<dyn Effect>, ranges: Vec<Option<[f64; 2]>>| -> Arc<dyn Effect> {
+            effect.form().map_or_else(|| effect.clone(), |form| Arc::new(form.fitted_within(ranges)))
         };
-        let effects = self.effects.iter().map(|(effect, range)| (held(effect), range.clone()));
+        let effects = self.effects.iter().zip(ranges).map(|((effect, own), ranges)| (held(effect, ranges), own.clone()));
         Self::numbered(effects.collect(), self.specs.clone(), self.base)
     }
 
-    /// The forms with a law whose variable the row placed last takes beyond its fitted range: their parameters, the variable, and by what
-    /// share of that range (at most 1).
+    /// What forms may be off in a row, of which `motion` is, that is beyond the rows that they were fitted to: the first parameter of each,
+    /// the variable that is most beyond, and the covariance of the point, m2, tracker frame.
     pub(crate) fn beyond(
         &self,
         robot: &RobotModel,
         data: &Measurements,
-        scratch: &PlacementBuffers,
-    ) -> Vec<(Range<usize>, Variable, f64)> {
-        let state = ArmState::new(data, 0, &scratch.posture, Vector3::zeros());
+        x: &[f64],
+        motion: &PointMotion,
+    ) -> Vec<(usize, Variable, Matrix3<f64>)> {
+        let state = ArmState::new(data, motion.row, &motion.posture, motion.point);
+        let mut beyond = BeyondFitted::new(robot.joints());
         let mut out = Vec::new();
         for (effect, range) in &self.effects {
-            let Some(term) = effect.form().and_then(|form| form.term()) else { continue };
-            let shares = term.law().factors().map(|factor| (factor.of, factor.beyond(robot, &state)));
-            if let Some((of, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| *share > 0.0) {
-                out.push((range.clone(), of, share));
-            }
+            let (Some(form), p) = (effect.form(), &x[range.clone()]) else { continue };
+            beyond.clear();
+            let Some(of) = form.beyond(robot, &state, p, &mut beyond) else { continue };
+            let moved = |(factor, motions): (f64, &[(usize, Direction)])| {
+                let sum: Vector3<f64> = motions.iter().map(|(k, direction)| motion.point_along(direction) * p[*k]).sum();
+                sum * sum.transpose() * (factor * factor)
+            };
+            out.push((range.start, of, beyond.groups().map(moved).sum()));
         }
         out
     }

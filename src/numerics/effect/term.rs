@@ -2,7 +2,7 @@
 
 use super::form::Placed;
 use super::law::Factor;
-use super::{ArmState, Basis, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
+use super::{ArmState, Basis, BeyondFitted, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
@@ -143,10 +143,27 @@ impl Placed for Term {
         Some(self)
     }
 
-    fn held_within(&self, range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {
-        let held = |factor: Factor| range(factor.of).map_or(factor, |range| factor.held_within(range));
-        let law = Law { first: held(self.law.first), times: self.law.times.map(held) };
+    fn held_within(&self, ranges: &[Option<[f64; 2]>]) -> Option<Form> {
+        let held = |factor: Factor, k: usize| ranges[k].map_or(factor, |range| factor.held_within(range));
+        let law = Law { first: held(self.law.first, 0), times: self.law.times.map(|times| held(times, 1)) };
         Some(self.with(law).into())
+    }
+
+    fn beyond(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        p: &[f64],
+        _within: &[Option<[f64; 2]>],
+        out: &mut BeyondFitted,
+    ) -> Option<Variable> {
+        let (of, groups) = self.law.beyond(robot, state)?;
+        let count = self.law.count();
+        for group in groups {
+            group.into_iter().for_each(|(k, off)| self.motion.add(robot, state, (k, count), off, p, &mut out.motions));
+            out.close(1.0);
+        }
+        Some(of)
     }
 
     fn body(&self) -> serde_json::Value {

@@ -36,10 +36,11 @@ pub(super) fn numbers(term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
         prefixes.iter().flat_map(of_one).collect()
     };
     match term.motion() {
-        Motion::Joint { .. } if term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. })) => {
-            each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD)
-        }
-        Motion::Joint { .. } => each(&["c"], term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+        Motion::Joint { .. } => match term.law().times.filter(|factor| matches!(factor.of, Variable::Load { .. })) {
+            Some(load) if load.basis == Basis::PROPORTIONAL => each(&["c"], Unit::RadianPerNewtonMetre, PER_LOAD),
+            Some(_) => each(&["c"], term.motion().unit(robot), PER_LOAD),
+            None => each(&["c"], term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+        },
         Motion::Instrument { of: Polar::Range } => each(&["c"], Unit::Millimetre, 1e-3),
         Motion::Instrument { .. } => each(&["c"], Unit::Radian, 1e-4),
         Motion::Axis { about: Some(axis), .. } => each(&[["a", "b"][axis.min(1)]], Unit::Radian, WIDE),

@@ -168,6 +168,15 @@ impl Variable {
         }
     }
 
+    /// By how much a value is beyond a range, at most 1: as a share of the range, of a load of its distance from no load.
+    pub(super) fn share_beyond(self, value: f64, [low, high]: [f64; 2]) -> f64 {
+        let loads = matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::ArmLoad);
+        let [low, high] = if loads { [low.min(0.0), high.max(0.0)] } else { [low, high] };
+        let span = if loads { high.max(-low) } else { high - low };
+        let off = (low - value).max(value - high).max(0.0);
+        if off == 0.0 { 0.0 } else { (off / span).min(1.0) }
+    }
+
     /// Whether its value needs to know how the arm hangs.
     pub(super) fn needs_torque(self) -> bool {
         matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })

@@ -138,8 +138,9 @@ fn kind_faults(kind: &dyn MeasurementKind, columns: &Columns, place: &str, fault
     let values = values.join("`, `");
     if kind.about().own_sigma && told != mapped(Part::Sigma) {
         for sigma in settings(Part::Sigma) {
-            let message =
-                format!("`{values}` and `{sigma}` go together: its noise weights it, e.g. {sigma}: {{value: 0.02, unit: ...}}");
+            let message = format!(
+                "map `{values}` and `{sigma}` together: a reading is weighted by its noise, e.g. {sigma}: {{value: 0.02, unit: ...}}"
+            );
             faults.push(Fault::new(place, message));
         }
     }

@@ -62,9 +62,9 @@ impl ExternalAxes {
         };
         let Some((_, name, _, [least, most])) = self.columns.iter().find(moves) else { return Ok(()) };
         let message = format!(
-            "column `{name}` is an axis beside the robot's {joints} joints, and moves from {least} to {most}: what stands on it moves with it, \
-             and the robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it stands, or \
-             another name for the column if it is no axis"
+            "column `{name}` is an external axis, in addition to the robot's {joints} joints, and moves from {least} to {most}: what stands on it \
+             moves with it, and the robot file does not have it; allowed: the axis as a joint of the robot file, mapped in `q`, rows in which it \
+             stands, or another name for the column if it is no axis"
         );
         Err(Error::data(label, message))
     }

@@ -72,6 +72,7 @@ pub(super) struct Scan {
     pub ranges: Vec<[f64; 2]>,
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
+    samples: Option<JointSamples>,
     /// Hash of what all its usable rows say, of a file with what was measured.
     pub measured: Option<u64>,
     /// Ids of the first usable rows with their data rows, for a join by id.
@@ -99,6 +100,7 @@ impl Scan {
             largest: 0.0,
             ranges: Vec::new(),
             track: None,
+            samples: None,
             measured: open.binding().measures.then_some(0),
             first_ids: Vec::new(),
         }
@@ -127,13 +129,15 @@ pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: 
     }
     let labels: Vec<&str> = opened.iter().map(|open| open.label.as_str()).collect();
     let progress = FileProgress::begin(context, &format!("reading {}", labels.join(", ")), sizes.into_iter().sum(), "bytes");
-    let scans: Vec<Result<Scan>> = opened
-        .into_par_iter()
-        .enumerate()
-        .map(|(index, open)| file(settings, index, open, (arm, most), &progress, context))
-        .collect();
+    let scans: Vec<Result<Scan>> =
+        opened.into_par_iter().enumerate().map(|(index, open)| file(settings, index, open, (arm, most), &progress)).collect();
     // Of several faults that of the first file.
-    scans.into_iter().collect()
+    let mut scans = scans.into_iter().collect::<Result<Vec<_>>>()?;
+    for scan in &mut scans {
+        let track = |samples: JointSamples| samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context);
+        scan.track = scan.samples.take().map(track).transpose()?;
+    }
+    Ok(scans)
 }
 
 /// Reads file `index` of the settings.
@@ -143,13 +147,12 @@ fn file(
     mut open: OpenedFile,
     (arm, most): (&RobotJoints, usize),
     progress: &FileProgress,
-    context: &Context,
 ) -> Result<Scan> {
     let layout = &settings.files[index];
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let held = HeldRows::new(open.binding(), joined && index > 0, most / settings.files.len());
     let mut scan = Scan::new(&open, held);
-    let mut samples = is_track(settings, layout).then(JointSamples::default);
+    scan.samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != Duplicates::Keep;
     let (by_time, by_id) = (matches!(settings.join, Some(Join::Time { .. })), matches!(settings.join, Some(Join::Id {})));
     let (mut hasher, mut pace) = (RowHasher::default(), progress.counter());
@@ -176,7 +179,7 @@ fn file(
                     scan.times.push((time, narrow(row.number, &scan.label)?));
                 }
                 scan.odd(row, arm);
-                if let Some(samples) = &mut samples {
+                if let Some(samples) = &mut scan.samples {
                     sample(samples, row, layout, arm);
                 }
             }
@@ -196,9 +199,6 @@ fn file(
     (scan.lines, scan.read) = (open.lines(), open.row.number);
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
-    }
-    if let Some(samples) = samples {
-        scan.track = Some(samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context)?);
     }
     Ok(scan)
 }

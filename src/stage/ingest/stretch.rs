@@ -107,8 +107,8 @@ impl Stretches {
         let (line, gap) = self.gap.take()?;
         self.warned += 1;
         match self.warned {
-            1..TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; what follows is a stretch of its own")),
-            TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s, as at other lines before and perhaps after")),
+            1..TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; another stretch begins")),
+            TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; further gaps are not listed")),
             _ => None,
         }
     }

@@ -40,7 +40,7 @@ pub(super) fn faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         if let Some(other) = earlier.iter().find(|other| other.group == own.group || (other.alone && own.alone)) {
             let both =
                 if other.name == own.name { format!("{} twice", own.name) } else { format!("{} and {}", other.name, own.name) };
-            faults.push(Fault::new(&own.place, format!("{reference} is mapped to {both}; each has a column of its own")));
+            faults.push(Fault::new(&own.place, format!("{reference} is mapped to {both}; allowed: a column for each")));
         }
         earlier.push(own);
     });

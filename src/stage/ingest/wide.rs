@@ -32,7 +32,7 @@ impl WideTargets {
             faults.push(Fault::new(format!("{place}.columns.{name}"), "also in `targets`; map it in one of them"));
         }
         for name in others.iter().filter(|name| SIMULATED.contains(name)) {
-            let message = "one simulated point beside several targets; give each target a file of its own";
+            let message = "one simulated point and several targets; put each target in a separate file";
             faults.push(Fault::new(format!("{place}.columns.{name}"), message));
         }
         let place = &format!("{place}.targets");

@@ -423,3 +423,28 @@ fn a_makers_counting_is_found_whole_and_no_healthy_joint_is_mastered_again() {
         }
     }
 }
+
+#[test]
+fn a_wrong_unit_does_not_hide_how_a_controller_counts_its_joints() {
+    let sound = recorded(&fixture::spherical(), 61, json!([]));
+    let units: [(&str, f64, f64); 3] = [
+        ("the points are in inches and were read in millimetres", 1.0 / 25.4, 1.0),
+        ("the points are in metres and were read in millimetres", 1e-3, 1.0),
+        ("the joints are in rad and were read in deg", 1.0, PI / 180.0),
+    ];
+    for (unit, length, angle) in units {
+        let mut inputs = sound.clone();
+        let sign = [1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
+        joints(&mut inputs, |q| {
+            q.iter_mut().zip(sign).for_each(|(q, sign)| *q *= sign);
+            q[1] += FRAC_PI_2;
+            q.iter_mut().for_each(|q| *q *= angle);
+        });
+        inputs.recording.position.iter_mut().flatten().for_each(|x| *x *= length);
+        let said = diagnosed(&inputs).unwrap_or_else(|error| panic!("{unit}: {error}"));
+        let statement = &said.findings[0].statement;
+        for text in [unit, "sign: [1, -1, -1, 1, -1, 1]", "zero: [0, 90, 0, 0, 0, 0]"] {
+            assert!(statement.contains(text), "{unit}: {statement}");
+        }
+    }
+}

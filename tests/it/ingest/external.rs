@@ -22,7 +22,8 @@ fn desk(header: &str, axis: impl Fn(usize) -> String) -> Desk {
 fn an_axis_that_moves_and_that_the_robot_file_does_not_have_is_refused() {
     for (header, name) in [("eax_a", "eax_a"), ("E1", "E1"), ("track_mm", "track_mm")] {
         let said = refusal(&desk(header, |row| format!("{}", 100 * row)), YAML, robot("rr", 1.0));
-        let sentence = format!("a.csv: column `{name}` is an axis beside the robot's 2 joints, and moves from 0 to 1100");
+        let sentence =
+            format!("a.csv: column `{name}` is an external axis, in addition to the robot's 2 joints, and moves from 0 to 1100");
         assert!(said.starts_with(&sentence), "{said}");
     }
     for (header, value) in [("eax_a", "9E9"), ("E1", "0.004"), ("rail", "")] {

@@ -66,7 +66,7 @@ fn images_of_a_camera_need_their_noise_and_no_unit() {
     let details: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.as_str()).collect();
     assert!(details[0].starts_with("u: `12`; allowed: -10 to 10") && details[1..] == ["v is blank"], "{details:?}");
     let faults: Vec<String> = settings(&with(lines)).check().iter().map(ToString::to_string).collect();
-    assert!(faults.iter().any(|fault| fault.contains("`image_x`, `image_y` and `sigma_image` go together")), "{faults:?}");
+    assert!(faults.iter().any(|fault| fault.contains("map `image_x`, `image_y` and `sigma_image` together")), "{faults:?}");
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn distances_need_no_point_and_half_an_orientation_is_refused() {
 fn what_belongs_together_is_asked_for_together() {
     let faults = |lines: &str| settings(&with(lines)).check().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     let alone = faults("      distance: {column: l, unit: mm}\n");
-    assert!(alone.contains("`distance` and `sigma_distance` go together"), "{alone}");
+    assert!(alone.contains("map `distance` and `sigma_distance` together"), "{alone}");
     let two = faults(
         "      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n",
     );

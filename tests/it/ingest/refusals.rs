@@ -39,7 +39,7 @@ fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
 #[test]
 fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
     let faults = |yaml: &str| calib::stage::Stage::check(&settings(yaml)).iter().map(ToString::to_string).collect::<Vec<_>>();
-    let own = "each has a column of its own";
+    let own = "allowed: a column for each";
     assert_eq!(
         faults(&TWO.replace("column: y", "column: \" x\"")),
         [format!("files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {own}")]

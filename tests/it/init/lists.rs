@@ -76,7 +76,7 @@ fn a_grid_and_a_check_set_are_two_recordings_of_which_the_second_judges() {
     made.has(&[
         "usage: {value: fit}   # CHECK: every row of this file",
         "usage: {value: validate}   # CHECK: every row of this file",
-        "join: {by: append}      # CHECK: recordings of their own, one after the other",
+        "join: {by: append}      # CHECK: separate recordings, one after the other",
         "with: {by: usage, blank: fit}",
         "point_id: {column: \"Punkt\"}",
     ]);

@@ -67,7 +67,7 @@ fn what_does_not_fit_is_refused_with_its_place() {
     let path = refused(&NAMED.replace("hole_{n}", "socket_{n}"), "data/*/hole_?.csv");
     assert!(path.contains("files[0].columns.socket.path") && path.contains("does not end like"), "{path}");
     let alone = refused("            socket: {value: a}\n", "data/back/hole_0.csv");
-    assert!(alone.contains("`socket` and `sigma_socket` go together"), "{alone}");
+    assert!(alone.contains("map `socket` and `sigma_socket` together"), "{alone}");
     let distance = "            distance: {value: 0, unit: mm}\n            sigma_distance: {value: 0.1, unit: mm}\n";
     let nought = refused(distance, "data/back/hole_0.csv");
     assert!(nought.contains("columns.distance") && nought.contains("`socket: {column: ...}`"), "{nought}");

@@ -7,8 +7,8 @@ use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::pairs::{PointPairs, sampled};
 use super::placement::{Placement, place};
-use super::wrong::WrongSetup;
-use crate::criteria::setup::{ALIKE, BETTER, CLOUD, GOOD, NOMINAL, OWN_NUMBERS, SAME, SECOND};
+use super::wrong::{LENGTHS, WrongSetup};
+use crate::criteria::setup::{ALIKE, BETTER, CLOUD, GOOD, NOMINAL, OWN_NUMBERS, SAME, SECOND, TURNS};
 use crate::diagnose::types::Question;
 use crate::robot::RobotModel;
 use nalgebra::Vector3;
@@ -101,6 +101,15 @@ impl<'a> AsStated<'a> {
         Try { wrong, placed, share: own * share, explains }
     }
 
+    /// Whether joints turn as far as joints do, and farther than an arm at rest, with a wrong unit of theirs mended.
+    fn turns_as_joints_do(&self, unit: WrongSetup) -> bool {
+        let (robot, mended) = (self.question.robot, self.mended(&[unit]));
+        let turning = (0..mended.rows()).flat_map(|row| (0..robot.joints()).map(move |joint| (row, joint)));
+        let largest = turning.filter(|(_, joint)| robot.is_revolute(*joint)).map(|(row, joint)| mended.q(row)[joint].abs());
+        let largest = largest.fold(0.0, f64::max);
+        (TURNS[0]..=TURNS[1]).contains(&largest.to_degrees())
+    }
+
     /// Two set-ups whose rows were read as one, where that explains it.
     pub fn two_setups(&self) -> Option<TwoSetups> {
         let of = |rows: &[usize]| PointPairs::of(self.question.robot, self.question.data, rows.iter().map(|row| (*row, *row)));
@@ -110,7 +119,8 @@ impl<'a> AsStated<'a> {
         is_right.then(|| found.of_all(&of(&self.rows), &self.rows))
     }
 
-    /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else two.
+    /// What explains it: one set-up error as a right set-up does, else the whole counting of joints, else one as far as it goes, else a
+    /// counting and a unit, else two.
     pub fn explained(&self) -> Option<ExplainedSetup> {
         let data = self.question.data;
         let in_order = PointPairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
@@ -120,9 +130,20 @@ impl<'a> AsStated<'a> {
         if let Some(found) = first.as_ref().filter(|found| found.placed.left < *GOOD * self.reach) {
             return Some(found.clone());
         }
-        let countings = Counting::likely(&self.mended(&[]));
-        let counted: Vec<Try> = countings.par_iter().map(|one| self.tried(vec![WrongSetup::Counting(*one)])).collect();
-        if let Some(found) = chosen(&counted).or(first) {
+        let countings = |unit: &[WrongSetup]| -> Vec<Vec<WrongSetup>> {
+            let found = Counting::likely(&self.mended(unit)).into_iter();
+            found.map(|counting| [unit, &[WrongSetup::Counting(counting)]].concat()).collect()
+        };
+        let try_all = |all: Vec<Vec<WrongSetup>>| chosen(&all.into_par_iter().map(|wrong| self.tried(wrong)).collect::<Vec<_>>());
+        let counted = countings(&[]);
+        if let Some(found) = try_all(counted.clone()).or(first) {
+            return Some(found);
+        }
+        // A unit of the points scales them and hides no counting; one of the joints is mended before theirs is looked for.
+        let of_points = (0..LENGTHS.len()).map(|unit| vec![WrongSetup::PointUnit(unit)]);
+        let with_units = of_points.flat_map(|unit| counted.iter().map(move |one| [&unit[..], &one[..]].concat()));
+        let of_joints = [WrongSetup::InRadians, WrongSetup::InDegrees].into_iter().filter(|unit| self.turns_as_joints_do(*unit));
+        if let Some(found) = try_all(with_units.chain(of_joints.flat_map(|unit| countings(&[unit]))).collect()) {
             return Some(found);
         }
         one.sort_by(|a, b| a.share.total_cmp(&b.share));

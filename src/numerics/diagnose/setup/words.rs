@@ -50,7 +50,9 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             });
             (
                 format!("joints {} and {} are exchanged", a + 1, b + 1),
-                format!("in `ingest`, by the columns that are mapped today: `columns: {{q: {{.., columns: [{order}]}}}}`"),
+                format!(
+                    "in `ingest`, with the columns in the order in which they are mapped now: `columns: {{q: {{.., columns: [{order}]}}}}`"
+                ),
             )
         }
         WrongSetup::Zero(joint, quarters) => {
@@ -245,7 +247,7 @@ fn of_number(number: FreeNumber, values: &[f64], joints: usize) -> SetupWords {
             let rest = -degrees - 90.0 * f64::from(quarters);
             if quarters != 0 && rest.abs() < *QUARTERLY && joints <= MOST {
                 let SetupWords { what, mend, .. } = of_counting(Counting::of_a_zero(joint, quarters), joints);
-                let what = format!("{what}, which is {} deg off beyond that", figure(rest, 2));
+                let what = format!("{what}, and is {} deg off besides", figure(rest, 2));
                 return SetupWords::of(what, mend);
             }
             (

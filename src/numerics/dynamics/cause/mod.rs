@@ -40,7 +40,7 @@ pub(super) use rotor::ROTOR;
 pub(super) use torque_constant::TORQUE_CONSTANT;
 pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
-pub use viscous::line_of_power;
+pub(super) use viscous::line_of_power;
 
 /// All causes with columns; latency and contacts are looked for before.
 pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 26] = [
@@ -231,8 +231,10 @@ pub(super) type CoefficientName = (&'static str, &'static str);
 
 /// A coefficient and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FittedNumber {
+pub struct FittedNumber {
+    /// SI.
     pub value: f64,
+    /// The same unit.
     pub sigma: f64,
 }
 

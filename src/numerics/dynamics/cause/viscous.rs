@@ -47,7 +47,7 @@ impl TorqueCause for Viscous {
 
 /// The straight line nearest to a power of speed over all speeds up to the fastest: at rest, and its slope. Viscous and Coulomb friction that
 /// grow with another power are parts of one sum, and as numbers are those of its line.
-pub fn line_of_power(exponent: f64, fastest: f64) -> [f64; 2] {
+pub(in super::super) fn line_of_power(exponent: f64, fastest: f64) -> [f64; 2] {
     // Over shares x of the fastest speed: means of x^e and of x x^e.
     let (mean, moment) = (1.0 / (exponent + 1.0), 1.0 / (exponent + 2.0));
     let slope = 12.0 * (moment - 0.5 * mean);
