@@ -17,7 +17,7 @@ mod pool;
 mod round;
 mod separate;
 mod setup;
-mod table;
+pub(crate) mod table;
 mod too_few;
 mod types;
 mod unasked;

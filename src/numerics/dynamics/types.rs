@@ -16,8 +16,6 @@ pub struct TorqueQuestion {
     pub without: Vec<String>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,
-    /// Seed of the bootstrap.
-    pub seed: u64,
 }
 
 /// What the simulated torques rest on.
@@ -201,8 +199,6 @@ pub struct TorqueDiagnosis {
     pub held_out: bool,
     /// Strongest first.
     pub findings: Vec<TorqueFinding>,
-    /// Findings that held-out rows did not confirm, a sentence each: they are not in the model.
-    pub withdrawn: Vec<String>,
     /// What these data cannot show, a sentence each.
     pub not_observable: Vec<String>,
     /// Per joint.
