@@ -3,7 +3,7 @@
 
 use super::cause::TORQUE_CONSTANT;
 use super::choice::CauseChoice;
-use crate::criteria::cells::{COMMON, JOINS, LEAVES, NU, SWAPS};
+use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
 use crate::diagnose::table::{AMPLITUDES, EvidenceRows, KnownState, evidence, log_sum};
 use crate::effect::Place;
@@ -215,7 +215,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             let state = self.state(&components, None);
             let words = (0..self.cells.len()).filter_map(|cell| self.cell(cell, &state));
             let Some(best) = words.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds)) else { break };
-            if best.log_odds < *JOINS {
+            if best.log_odds < 0.5 * *APART {
                 break;
             }
             components.push(best.best);
@@ -236,7 +236,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
             };
             let odds = (0..components.len()).filter(free).map(|place| (place, self.odds_of(&components, place, kappa).log_odds));
             match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((place, odds)) if odds < *LEAVES => {
+                Some((place, odds)) if odds < 0.5 * *APART => {
                     components.remove(place);
                     components = self.backfit(components);
                 }
