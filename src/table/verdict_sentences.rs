@@ -51,8 +51,9 @@ impl VerdictSentences {
 
     /// The same of a diagnosis of torques.
     pub fn of_torques(step: &str, diagnosis: &TorqueDiagnosis) -> Self {
+        let withdrawn = (VerdictTopic::Withdrawn, diagnosis.withdrawn.as_slice());
         let remarks = (VerdictTopic::Remark, diagnosis.remarks.as_slice());
-        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), remarks])
+        Self::of(step, &[(VerdictTopic::NotObservable, &diagnosis.not_observable), withdrawn, remarks])
     }
 
     /// What the stage `step` says of a topic, in its order.

@@ -21,7 +21,7 @@ fn covers((value, sigma): (f64, f64), truth: f64) -> bool {
 #[test]
 fn a_zero_that_drifts_is_an_offset_and_nothing_else() {
     let drifting = diagnosed(&|row| if row.0 == 3 { 3.0 * (1.0 - 0.5 * (-row.1 / 10.0).exp()) } else { 0.0 });
-    assert_eq!(found(&drifting), ["current_offset joint 4"]);
+    assert_eq!(found(&drifting), ["current_offset joint 4"], "{:#?}", drifting.withdrawn);
     assert!(
         covers(stated(&drifting, "current_offset", "offset"), 3.0) && covers(stated(&drifting, "current_offset", "time"), 10.0)
     );

@@ -37,6 +37,7 @@ mod friction_lead;
 mod friction_line;
 mod inertial_names;
 mod inertials;
+mod judge;
 mod latency;
 mod masses;
 mod model;

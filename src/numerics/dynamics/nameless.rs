@@ -1,4 +1,4 @@
-//! What has no name: joints of which the named causes leave too much.
+//! What has no name: forms without one that held-out rows do not confirm, and joints of which the named causes leave too much.
 
 use super::cause::{COULOMB, TORQUE_CAUSES, UNKNOWN, VISCOUS};
 use super::choice::CauseChoice;
@@ -11,6 +11,8 @@ use crate::effect::Place;
 use crate::statistics::nearest;
 use std::ops::Range;
 
+/// Standard deviations of the mean square of noise.
+const DEVIATIONS: f64 = 3.0;
 /// Residual over the noise, of fitted and of held-out rows, above which something is left at a joint.
 const LEFT: f64 = 1.2;
 /// Two torques cancel that are together less than this share of either.
@@ -19,6 +21,30 @@ const CANCELLED: f64 = 0.5;
 const SHOWN: f64 = 2.0;
 /// Times what is left that a name must explain: less than two thirds of what stands at a joint is no explanation.
 const EXPLAINED: f64 = 2.0;
+
+/// Something without a name of which held-out rows confirm that it is there, though not its shape: what they leave at its joint stands
+/// above the noise.
+pub(super) fn unconfirmed(choice: &CauseChoice, withdrawn: &[(usize, f64)], residual: &[Vec<f64>]) -> Vec<TorqueFinding> {
+    let problem = choice.problem;
+    let runs = problem.runs(true);
+    let errors = problem.weighing(&runs).measured(residual);
+    let mut found: Vec<TorqueFinding> = Vec::new();
+    for form in withdrawn.iter().map(|(number, _)| choice.form(*number)).filter(|form| form.cause.name() == UNKNOWN) {
+        let own = &errors[form.joint()];
+        let rows = own.len() as f64;
+        let above = own.iter().map(|error| error * error).sum::<f64>() / rows - 1.0;
+        if above < DEVIATIONS * (2.0 / rows).sqrt() || found.iter().any(|known| known.place == form.place) {
+            continue;
+        }
+        let statement = format!(
+            "something without a name acts at {}: held-out rows are {:.0} % further off than noise, of a shape that they do not confirm",
+            form.place,
+            100.0 * ((1.0 + above).sqrt() - 1.0)
+        );
+        found.push(plain_finding(UNKNOWN, form.place, statement, Vec::new(), above * rows, form.width as f64));
+    }
+    found
+}
 
 /// "None of the list" competes with each name: where the causes of a joint leave more than noise and explain less than two thirds of what
 /// stands there, it is something without a name, with theirs as rivals; where there are none, too.

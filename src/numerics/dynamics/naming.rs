@@ -18,6 +18,8 @@ pub(super) struct JudgedSet {
     pub set: Vec<usize>,
     /// What of the set is part of the model, but too little to be named.
     pub silent: Vec<usize>,
+    /// What held-out rows did not confirm, with what they gained by each.
+    pub withdrawn: Vec<(usize, f64)>,
 }
 
 /// What becomes of a form.

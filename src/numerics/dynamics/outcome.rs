@@ -1,12 +1,13 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
 use super::bodies::with_bodies;
+use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
 use super::findings::{contact, findings, plain_finding};
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
-use super::nameless::{absorb, absorb_drag, unname};
+use super::nameless::{absorb, absorb_drag, unconfirmed, unname};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -52,6 +53,10 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
     unname(&choice, &last, &mut found);
+    let named = |place: Place| found.iter().any(|known| known.effect == UNKNOWN && known.place == place);
+    let unconfirmed: Vec<TorqueFinding> =
+        unconfirmed(&choice, &solved.judged.withdrawn, &last).into_iter().filter(|one| !named(one.place)).collect();
+    found.extend(unconfirmed);
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);
@@ -76,6 +81,7 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
         after,
         held_out: !held.is_empty(),
         findings: found,
+        withdrawn: withdrawn(&choice, &solved.judged.withdrawn),
         not_observable: not_observable(&choice, set, &sweep),
         leftover,
         events: problem.events.clone(),
@@ -130,6 +136,19 @@ fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], ove
         }
         _ => format!("with {} up to {over:.1} times the noise is left ({falls})", counted(found.len(), "finding")),
     }
+}
+
+fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
+    let sentence = |(number, gain): &(usize, f64)| {
+        let form = choice.form(*number);
+        let squares = if *gain < 0.0 { format!("grows by {:.1}", -gain) } else { format!("falls by {gain:.1} only") };
+        format!(
+            "{} at {}: held-out rows do not confirm it (with it their squared error over the noise {squares})",
+            form.cause.name(),
+            form.place
+        )
+    };
+    withdrawn.iter().map(sentence).collect()
 }
 
 /// What is left of fitted rows.

@@ -6,6 +6,7 @@ use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
 use super::friction_lead::take_friction_lead;
+use super::judge::judge;
 use super::latency::{Latency, latency};
 use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::polish::polish;
@@ -92,10 +93,12 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted(&set);
     let mut judged = {
         let choice = CauseChoice::new(&problem, &weighted);
-        let mut set = settle(&choice, &set);
-        let silent = choice.other_friction(&set);
-        set.extend(&silent);
-        JudgedSet { set, silent }
+        let mut judged = judge(&choice, settle(&choice, &set));
+        // What only stood for something that was withdrawn.
+        judged.set = settle(&choice, &judged.set);
+        judged.silent = choice.other_friction(&judged.set);
+        judged.set.extend(&judged.silent);
+        judged
     };
     weighted = problem.weighted_of(&judged.set);
     polish(&mut problem, &mut weighted, &mut judged.set);

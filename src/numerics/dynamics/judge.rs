@@ -1,0 +1,57 @@
+//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding.
+
+use super::choice::CauseChoice;
+use super::naming::JudgedSet;
+use super::problem::TorqueProblem;
+use super::sweep::SweptColumns;
+use super::weighted::Weighing;
+
+/// What each column of a finding must gain.
+const GAIN: f64 = 3.0;
+/// Standard deviations below the gain that the finding itself foretells: where held-out rows hardly show it, nothing is asked.
+const DEVIATIONS: f64 = 2.0;
+
+/// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
+fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &SweptColumns) -> (Vec<f64>, f64) {
+    let solution = sweep.solution();
+    let stretched = solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
+    (weighing.measured(&problem.residual(&solution)).concat(), stretched)
+}
+
+/// What held-out rows gain by each of a set, and what they must.
+fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
+    let runs = choice.problem.runs(true);
+    let weighing = choice.problem.weighing(&runs);
+    let (whole, stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(set));
+    let without = |place: usize| {
+        let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
+        let (errors, rest_stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(&rest));
+        let pairs = || errors.iter().zip(&whole);
+        let gain = pairs().map(|(without, with)| without * without - with * with).sum::<f64>() + rest_stretched - stretched;
+        let foretold = pairs().map(|(without, with)| (without - with).powi(2)).sum::<f64>() + rest_stretched - stretched;
+        // The gain of a right finding scatters about its own square by twice its root.
+        let least = foretold - DEVIATIONS * 2.0 * foretold.max(0.0).sqrt();
+        (gain, least.min(GAIN * choice.form(set[place]).width as f64))
+    };
+    (0..set.len()).map(without).collect()
+}
+
+/// Withdraws the worst until all are confirmed; nothing where no rows are held out.
+pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
+    let mut withdrawn = Vec::new();
+    if choice.problem.runs(true).is_empty() {
+        return JudgedSet { set, silent: Vec::new(), withdrawn };
+    }
+    loop {
+        let gains = gains(choice, &set);
+        let short = |place: &usize| gains[*place].0 - gains[*place].1;
+        let needed = |place: &usize| {
+            let form = choice.form(set[*place]);
+            set.iter().any(|other| choice.form(*other).modifies(form))
+        };
+        let worst = (0..set.len()).filter(|place| short(place) < 0.0 && !needed(place));
+        let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
+        withdrawn.push((set.remove(worst), gains[worst].0));
+    }
+    JudgedSet { set, silent: Vec::new(), withdrawn }
+}
