@@ -17,7 +17,7 @@ mod pool;
 mod round;
 mod separate;
 mod setup;
-pub(crate) mod table;
+mod table;
 mod too_few;
 mod types;
 mod unasked;

@@ -15,8 +15,6 @@ mod search;
 mod state;
 
 pub(crate) use answer::{Answer, FoundCell};
-pub(crate) use evidence::{AMPLITUDES, EvidenceRows, evidence, log_sum};
-pub(crate) use state::KnownState;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
