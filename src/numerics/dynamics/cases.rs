@@ -33,6 +33,26 @@ pub(super) fn arm() -> DynamicArm {
     }
 }
 
+/// A recording that comes in blocks of so many rows.
+pub(super) struct Blocks(pub TorqueRecording, pub usize);
+
+impl TorqueSource for Blocks {
+    fn joints(&self) -> usize {
+        self.0.joints
+    }
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+    fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()> {
+        for start in (0..self.0.rows()).step_by(self.1) {
+            let mut block = TorqueRecording::like(&self.0);
+            block.extend(&self.0, start..(start + self.1).min(self.0.rows()));
+            take(&block)?;
+        }
+        Ok(())
+    }
+}
+
 /// Position, velocity and acceleration of the joints: sums of sines that share no period.
 fn moved(joint: usize, time: f64) -> (f64, f64, f64) {
     let mut sum = (0.1 * joint as f64, 0.0, 0.0);

@@ -191,7 +191,7 @@ fn gather(block: &TorqueRecording, apart: &mut [Vec<f64>; 2], moved: &mut Vec<f6
 #[cfg(test)]
 mod tests {
     use super::super::DynamicArm;
-    use super::super::cases::arm;
+    use super::super::cases::{Blocks, arm};
     use super::super::used::UsedRecording;
     use super::*;
     use rand::rngs::ChaCha8Rng;
@@ -258,23 +258,6 @@ mod tests {
 
     #[test]
     fn it_does_not_matter_where_blocks_of_uneven_rows_end() {
-        struct Blocks(TorqueRecording, usize);
-        impl TorqueSource for Blocks {
-            fn joints(&self) -> usize {
-                self.0.joints
-            }
-            fn rows(&self) -> usize {
-                self.0.rows()
-            }
-            fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()> {
-                for start in (0..self.0.rows()).step_by(self.1) {
-                    let mut block = TorqueRecording::like(&self.0);
-                    block.extend(&self.0, start..(start + self.1).min(self.0.rows()));
-                    take(&block)?;
-                }
-                Ok(())
-            }
-        }
         let times = uneven();
         let even = |block: usize| {
             let source = Blocks(rows(&times, &times), block);

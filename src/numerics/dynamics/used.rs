@@ -93,29 +93,9 @@ fn said(rows: usize, kept: &TorqueRecording, plan: &ThinningPlan, rate: f64) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::cases::{arm, record_at};
+    use super::super::cases::{Blocks, arm, record_at};
     use super::super::types::{TorqueDiagnosis, TorqueQuestion};
     use super::*;
-
-    /// A recording that comes in blocks of so many rows.
-    struct Blocks(TorqueRecording, usize);
-
-    impl TorqueSource for Blocks {
-        fn joints(&self) -> usize {
-            self.0.joints
-        }
-        fn rows(&self) -> usize {
-            self.0.rows()
-        }
-        fn blocks(&self, take: &mut dyn FnMut(&TorqueRecording) -> Result<()>) -> Result<()> {
-            for start in (0..self.0.rows()).step_by(self.1) {
-                let mut block = TorqueRecording::like(&self.0);
-                block.extend(&self.0, start..(start + self.1).min(self.0.rows()));
-                take(&block)?;
-            }
-            Ok(())
-        }
-    }
 
     /// 40 s at 2 kHz with friction in two joints.
     fn long() -> TorqueRecording {
