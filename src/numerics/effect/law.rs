@@ -105,6 +105,9 @@ pub struct Law {
     pub times: Option<Factor>,
 }
 
+/// What functions of a law, by their numbers, may be off: groups that are independent of each other.
+pub(super) type Departures = Vec<Vec<(usize, f64)>>;
+
 impl Law {
     /// Functions of one variable.
     pub const fn new(of: Variable, basis: Basis) -> Self {
@@ -148,7 +151,7 @@ impl Law {
 
     /// In a row beyond the fitted range of a variable: that variable, and what the law may be off, groups of (function, by how much) that
     /// are independent of each other, one standard deviation each. None inside.
-    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(Variable, Vec<Vec<(usize, f64)>>)> {
+    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> Option<(Variable, Departures)> {
         let first = self.first.off(robot, state);
         let Some(times) = &self.times else {
             let (off, _) = first?;

@@ -144,7 +144,7 @@ impl Placed for Term {
     }
 
     fn held_within(&self, ranges: &[Option<[f64; 2]>]) -> Option<Form> {
-        let held = |factor: Factor, k: usize| ranges[k].map_or(factor, |range| factor.held_within(range));
+        let held = |factor: Factor, k: usize| ranges.get(k).copied().flatten().map_or(factor, |range| factor.held_within(range));
         let law = Law { first: held(self.law.first, 0), times: self.law.times.map(|times| held(times, 1)) };
         Some(self.with(law).into())
     }

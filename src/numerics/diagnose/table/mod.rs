@@ -11,6 +11,7 @@ mod forms;
 mod frame;
 mod generated;
 mod listed;
+mod refine;
 mod scan;
 mod search;
 mod state;
