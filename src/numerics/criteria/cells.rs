@@ -75,6 +75,10 @@ criteria! {
     UNEVEN: f64 = 1.8, "ratio of variances", "count: the scatter of variances of a hundred rows", "";
     /// Rows of even noise that a shape of the noise has to speak against.
     EVEN: f64 = 10.0, "rows", "judgement: a shape by few rows is scatter", "";
+    /// Sum of the eigenvalues of a^2 X'X beyond which rounding decides on the smallest of them: no evidence there.
+    EXACT: f64 = 1e12, "ratio", "count: four digits of sixteen are left", "";
+    /// Functions of each of two variables where products are looked at for the first time.
+    ROUGHLY: usize = 4, "functions", "judgement: bounds time", "";
     /// Functions of each of two variables in a product, of motions in one direction, in two, in three.
     EACH: [usize; 3] = [6, 5, 4], "functions", "judgement: bounds time", "";
     /// Cosines of what is not straight in a law that is nearly a line.

@@ -92,7 +92,7 @@ const ROUGH: Effort = Effort { tolerance: ROUGH_TOLERANCE, ..FINE };
 /// Effort of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
-const CLEARLY: f64 = 10.0;
+pub(crate) const CLEARLY: f64 = 10.0;
 /// ... and where they lower the cost by this and so much for each further one: chi-square as rare as five sigmas, so that
 /// hundreds of robots of one kind keep one set of parameters.
 const WORTH: [f64; 2] = [12.5, 1.75];
@@ -129,13 +129,22 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
     (model, fitted)
 }
 
-/// Which of the candidates the data can see around a fitted model, in their order.
-pub(crate) fn seen(model: &Model, data: &Measurements, fitted: &Fitted, options: &FitOptions) -> Vec<usize> {
-    let problem = Problem { data, rows: options.rows, excess: fitted.excess() };
-    let factor = problem.observe(model, options.candidates).factor;
-    let prior: Vec<f64> = options.candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
-    let seen = visibility(&factor, &prior).into_iter().zip(options.candidates);
-    seen.filter(|(seen, _)| *seen == Visibility::Seen).map(|(_, k)| *k).collect()
+/// Which of some further parameters the data can see around a fitted model next to those that were fitted, `times` better than their priors.
+pub(crate) fn seen(
+    model: &Model,
+    data: &Measurements,
+    fitted: &Fitted,
+    rows: &[usize],
+    further: &[usize],
+    times: f64,
+) -> Vec<usize> {
+    let problem = Problem { data, rows, excess: fitted.excess() };
+    let known = fitted.free();
+    let candidates: Vec<usize> = known.iter().chain(further).copied().collect();
+    let prior = |k: &usize| if known.contains(k) { f64::INFINITY } else { model.stack.specs()[*k].prior_sigma / times };
+    let seen = visibility(&problem.observe(model, &candidates).factor, &candidates.iter().map(prior).collect::<Vec<_>>());
+    let seen = seen.into_iter().zip(candidates).filter(|(seen, k)| *seen == Visibility::Seen && further.contains(k));
+    seen.map(|(_, k)| k).collect()
 }
 
 /// What the data (`all`: in all candidates, at the minimum) say of a fitted model.

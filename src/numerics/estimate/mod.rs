@@ -44,7 +44,7 @@ pub use covariance::Covariance;
 pub use error_scale::ErrorScale;
 pub(crate) use error_scale::noise;
 pub(crate) use fisher::tail;
-pub(crate) use fit::seen;
+pub(crate) use fit::{CLEARLY, seen};
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub(crate) use fold_factors::NearbyFits;
 pub(crate) use folds::{FoldKind, dealt, gather};

@@ -8,7 +8,7 @@ use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Load, Variable, arm_effect, names};
 use crate::estimate::{
-    ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen,
+    CLEARLY, ErrorScale, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, Session, fit_screened, seen,
 };
 use crate::robot::Measurements;
 use std::ops::Range;
@@ -65,6 +65,8 @@ pub(crate) struct Fitter<'a> {
     pub scale: ErrorScale,
     /// Base parameters to estimate, in order of precedence; at first all.
     free: Vec<usize>,
+    /// Base parameters that the rows hardly show.
+    faint: Vec<usize>,
     pub repeatability: JointRepeatability,
     /// What a deviation of the joints makes of every row's readings.
     spread: JointSpread,
@@ -90,6 +92,7 @@ impl<'a> Fitter<'a> {
             data: question.data.clone(),
             scale: ErrorScale::of(question.data, question.fit),
             free: Vec::new(),
+            faint: Vec::new(),
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: JointSpread::default(),
             repeated: 0.0,
@@ -139,17 +142,25 @@ impl<'a> Fitter<'a> {
         &self.free
     }
 
-    /// Adds the base parameters that the rows show around a fitted model: beside a large effect that the model lacked they could not be seen.
+    /// Base parameters that the rows show at all: what they could do is no cause.
+    pub fn seen(&self) -> Vec<usize> {
+        self.free.iter().chain(&self.faint).copied().collect()
+    }
+
+    /// Takes the base parameters that the rows show around a fitted model: beside a large effect that the model lacked they could not be seen.
+    /// Those that they hardly show are not estimated.
     pub fn follow(&mut self, state: &FitState) {
         let first = state.ranges.first().map_or(state.model.x.len(), |range| range.start);
         if self.free.is_empty() {
             self.free = state.fitted.free();
         }
-        let others = (0..first).filter(|k| !self.free.contains(k));
-        let candidates: Vec<usize> = self.free.iter().copied().chain(others).collect();
-        let options = FitOptions { rows: &state.screening.kept, candidates: &candidates };
-        let more = seen(&state.model, &self.data, &state.fitted, &options);
-        self.free.extend(more.into_iter().filter(|k| !self.free.contains(k)).collect::<Vec<_>>());
+        let seen = |known: &[usize], times| {
+            let others: Vec<usize> = (0..first).filter(|k| !known.contains(k)).collect();
+            seen(&state.model, &self.data, &state.fitted, &state.screening.kept, &others, times)
+        };
+        let clearly = seen(&self.free, CLEARLY);
+        self.free.extend(clearly);
+        self.faint = seen(&self.free, 1.0);
     }
 
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where

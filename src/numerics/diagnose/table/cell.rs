@@ -1,6 +1,6 @@
 //! Cells: a cause at a place in every shape that it may have, or a motion of a place over a variable that no cause of the list has.
 
-use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, STEPS};
+use crate::criteria::cells::{BENDING, BENT, EACH, FEW, LENGTHS, MARGIN, ROUGHLY, STEPS};
 use crate::effect::{Basis, Form, Law, Motion, Place, Survey, Term, Unknown, Variable, names};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -157,7 +157,7 @@ impl FreeShape {
             }
             Over::Product(other) => {
                 let factors = [self.of, other].map(|of| {
-                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { ROUGHLY }))
+                    values(of).and_then(|values| factor(&values, if closely { EACH[fields.clamp(1, 3) - 1] } else { *ROUGHLY }))
                 });
                 let [Some(a), Some(b)] = factors else { return Vec::new() };
                 let form = self.term(Law::new(self.of, a).times(other, b));
@@ -190,9 +190,6 @@ impl FreeShape {
         }
     }
 }
-
-/// Functions of each of two variables where products are looked at for the first time.
-const ROUGHLY: usize = 4;
 
 /// A variable with other numbers.
 fn near(of: Variable, level: i32) -> Vec<Variable> {

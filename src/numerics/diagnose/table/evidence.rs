@@ -5,15 +5,12 @@
 //! ln E(a) = -1/2 sum_k ln(1 + a^2 L_k) - (n + nu)/2 ln[1 - sum_k z_k^2 a^2 / (1 + a^2 L_k) / (nu + r'r)]: the scale of the noise is
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
-use crate::criteria::cells::{LARGEST, NU, SMALLEST};
+use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
 use crate::diagnose::linear::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Amplitudes of the grid.
 pub(super) const AMPLITUDES: usize = 28;
-
-/// Sum of the eigenvalues of a^2 X'X beyond which rounding decides on the smallest of them.
-const EXACT: f64 = 1e12;
 
 /// How much the rows say: degrees of freedom and the squared residual, in standard deviations of the noise.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +63,7 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f
         *fit_there = fit;
         // Noise is always left: what leaves none is rounding.
         let left = 1.0 - fit / whole;
-        let sound = left > 1e-9 && square * trace < EXACT;
+        let sound = left > 1e-9 && square * trace < *EXACT;
         *log = if sound { -0.5 * determinant - half * left.ln() } else { f64::NEG_INFINITY };
     }
     if logs.iter().all(|log| *log == f64::NEG_INFINITY) {

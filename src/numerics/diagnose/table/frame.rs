@@ -75,7 +75,7 @@ impl<'a> SearchRows<'a> {
         }
         let mut out =
             Self { view, base: Mat::new(), residual: Vec::new(), variance, noise, directions: Vec::new(), values: Vec::new() };
-        let mut jacobian = problem.jacobian(fitter.free());
+        let mut jacobian = problem.jacobian(&fitter.seen());
         (0..jacobian.ncols()).for_each(|j| out.weigh(jacobian.col_as_slice_mut(j)));
         out.weigh(&mut residual);
         out.base = orthonormal(&jacobian);
