@@ -30,7 +30,6 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
     let model = &torques.model;
     let curves = model.friction_curves()?;
     let rows = |effect: &'static str| torques.parameters.0.iter().filter(move |row| row.effect == effect);
-    let number = |row: &TorqueParameterRow| json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma });
     let joints = export.corrected.joints.iter().enumerate().map(|(index, joint)| {
         let place = format!("joint {}", index + 1);
         let alone = |effect: &str| {
@@ -70,11 +69,46 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             "seen": { "position_rad": seen.position, "speed_rad_s": seen.speed, "acceleration_rad_s2": seen.acceleration },
         })
     });
+    Ok(json!({
+        "calib_torques": 1,
+        "name": export.corrected.name,
+        "origin": torques.origin,
+        "conventions": format!(
+            "SI; joints and links from 1, axes of the base at the zero pose; numbers of a link are {}, moments from its joint's point and \
+             inertias about it, those of links that are not whole stand for others too; the last link carries the payload; torques are those \
+             that the drives or sensors of the recording state; friction is the sum of all laws of speed at a joint, viscous and coulomb its parts \
+             where they stand alone: where one grows with another power of speed than the first (`law`), those of the straight line of both over the \
+             recorded speeds",
+            INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
+        ),
+        "sign_width_rad_s": model.sign_width,
+        "friction_lead_s": model.friction_lead,
+        "joints": joints.collect::<Vec<_>>(),
+        "links": links(torques),
+        "causes": causes(torques),
+        "of_the_recording": torques.of_the_recording,
+        "remarks": torques.warnings,
+    }))
+}
+
+/// A number with its unit and standard deviation.
+fn number(row: &TorqueParameterRow) -> Value {
+    json!({ "value": row.value, "unit": row.unit, "sigma": row.sigma })
+}
+
+/// Every link with its body and the numbers that were estimated.
+fn links(torques: &IdentifiedTorques) -> Vec<Value> {
+    let model = &torques.model;
     let consistent = model.consistency();
-    let links = (0..model.joints()).map(|link| {
+    let link = |link: usize| {
         let place = format!("link {}", link + 1);
-        let numbers: Map<String, Value> =
-            rows("rigid_body").filter(|row| row.place == place).map(|row| (row.quantity.clone(), number(row))).collect();
+        let numbers: Map<String, Value> = torques
+            .parameters
+            .0
+            .iter()
+            .filter(|row| row.effect == "rigid_body" && row.place == place)
+            .map(|row| (row.quantity.clone(), number(row)))
+            .collect();
         let body = model.body(link).map(|body| {
             let i = &body.inertia;
             json!({
@@ -87,26 +121,8 @@ pub(super) fn document(export: &Export, torques: &IdentifiedTorques) -> Result<V
             "link": link + 1, "whole": model.is_whole(link), "consistent": known.map(|one| one.is_consistent()),
             "body": body, "numbers": numbers,
         })
-    });
-    Ok(json!({
-        "calib_torques": 1,
-        "name": export.corrected.name,
-        "origin": torques.origin,
-        "conventions": format!(
-            "SI; joints and links from 1, axes of the base at the zero pose; numbers of a link are {}, moments from its joint's point and \
-             inertias about it, those of links that are not whole stand for others too; the last link carries the payload; torques are those \
-             that the drives or sensors of the recording state; friction is the sum of all laws of speed at a joint, viscous and coulomb its parts \
-             where they stand alone: where one grows with another power of speed than the first (`law`), those of the straight line of both over the              recorded speeds",
-            INERTIAL_NAMES[..INERTIAL_NUMBERS].join(", ")
-        ),
-        "sign_width_rad_s": model.sign_width,
-        "friction_lead_s": model.friction_lead,
-        "joints": joints.collect::<Vec<_>>(),
-        "links": links.collect::<Vec<_>>(),
-        "causes": causes(torques),
-        "of_the_recording": torques.of_the_recording,
-        "remarks": torques.warnings,
-    }))
+    };
+    (0..model.joints()).map(link).collect()
 }
 
 /// Every cause with all of its numbers.

@@ -188,8 +188,9 @@ fn formula(rows: &[FormRow]) -> String {
     let words = formula_in_words(rows);
     let errors = rows.first().map(|row| {
         let proposed = if row.proposed { ", proposed" } else { "" };
-        let [with, curve, without] = [row.folds_rms_mm, row.curve_rms_mm, row.without_rms_mm].map(mm);
-        format!(" ({} parts{proposed}; {with} mm cross-validated, {curve} mm with the curve, {without} mm without)", row.price)
+        let [with, curve] = [row.folds_rms_mm, row.curve_rms_mm].map(mm);
+        let without = row.without_rms_mm.map(|error| format!(", {} mm without", mm(error))).unwrap_or_default();
+        format!(" ({} parts{proposed}; {with} mm cross-validated, {curve} mm with the curve{without})", row.price)
     });
     format!("{words}{}", errors.unwrap_or_default())
 }

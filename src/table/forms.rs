@@ -19,7 +19,7 @@ impl Forms {
                 price: one.price as i64,
                 folds_rms_mm: one.folds * 1e3,
                 curve_rms_mm: one.curve * 1e3,
-                without_rms_mm: one.without * 1e3,
+                without_rms_mm: one.without.map(|without| without * 1e3),
                 proposed: one.chosen,
                 value: number.value,
                 unit: number.unit.into(),

@@ -120,8 +120,8 @@ pub struct ClosedForm {
     pub folds: f64,
     /// The same with the finding as it is.
     pub curve: f64,
-    /// The same without both.
-    pub without: f64,
+    /// The same without both; none where no fit without them is near.
+    pub without: Option<f64>,
     /// The cheapest that is as good as the best.
     pub chosen: bool,
     /// Shape numbers, then coefficients.

@@ -48,13 +48,13 @@ pub struct Deflection {
 }
 
 /// What a form may be off beyond the rows that it was fitted to: groups of motions, each group with a factor of one standard deviation.
-pub struct BeyondFitted {
+pub struct BeyondRange {
     /// Their directions, by the parameters of the form.
     pub motions: Deflection,
     ends: Vec<(usize, f64)>,
 }
 
-impl BeyondFitted {
+impl BeyondRange {
     pub(super) fn new(joints: usize) -> Self {
         Self { motions: Deflection::new(joints), ends: Vec::new() }
     }

@@ -3,7 +3,7 @@
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
 use super::{
-    ArmState, BeyondFitted, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term,
+    ArmState, BeyondRange, Cause, DeclaredForm, Deflection, Effect, ParameterEstimate, ParameterSpec, Place, Survey, Term,
     Variable, cause,
 };
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
@@ -91,7 +91,7 @@ pub trait Placed: Send + Sync {
         state: &ArmState,
         p: &[f64],
         within: &[Option<[f64; 2]>],
-        out: &mut BeyondFitted,
+        out: &mut BeyondRange,
     ) -> Option<Variable> {
         let (of, share) = self.most_beyond(robot, state, within)?;
         self.deflect(robot, state, p, &mut out.motions);
@@ -226,7 +226,7 @@ impl Form {
     }
 
     /// See [`Placed::beyond`].
-    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut BeyondFitted) -> Option<Variable> {
+    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut BeyondRange) -> Option<Variable> {
         self.placed.beyond(robot, state, p, &self.within, out)
     }
 

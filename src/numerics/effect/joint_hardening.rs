@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place,
-    Placed, Summary, Survey, Variable, figure, names,
+    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, ParameterEstimate, Place, Placed,
+    Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -155,7 +155,7 @@ impl Placed for BentWindup {
         state: &ArmState,
         p: &[f64],
         within: &[Option<[f64; 2]>],
-        out: &mut BeyondFitted,
+        out: &mut BeyondRange,
     ) -> Option<Variable> {
         let (of, share) = self.most_beyond(robot, state, within)?;
         let (torque, [low, high]) = (state.torque()[self.joint], within.first().copied().flatten()?);

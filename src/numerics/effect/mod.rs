@@ -54,7 +54,7 @@ pub use basis::Basis;
 pub use cause::{ArmEffectOf, Cause, Measure, OwnMotion, arm_effect, cause, identified};
 pub use change::moved_with_the_payload;
 pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclaration, Laws, ShapeRange, Starts};
-pub use deflection::{BeyondFitted, Deflection, Direction};
+pub use deflection::{BeyondRange, Deflection, Direction};
 pub use form::{Form, NumberSpec, Placed};
 pub use holder::turned_holder;
 pub use law::{Factor, Law};

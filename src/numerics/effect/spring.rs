@@ -7,7 +7,7 @@
 use super::form::placed;
 use super::unknown::described;
 use super::{
-    ArmState, BeyondFitted, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey,
+    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion, Place, Placed, Summary, Survey,
     Variable, names,
 };
 use crate::criteria::effect::UNCOMMON;
@@ -134,7 +134,7 @@ impl Placed for Spring {
         state: &ArmState,
         _p: &[f64],
         within: &[Option<[f64; 2]>],
-        out: &mut BeyondFitted,
+        out: &mut BeyondRange,
     ) -> Option<Variable> {
         let (of, share) = self.most_beyond(robot, state, within)?;
         for k in 0..2 * self.shape.orders as usize {

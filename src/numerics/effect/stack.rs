@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, from_anchor};
-use super::{ArmState, BeyondFitted, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
+use super::{ArmState, BeyondRange, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Matrix3x6, Vector3};
@@ -72,7 +72,7 @@ impl EffectStack {
         motion: &PointMotion,
     ) -> Vec<(usize, Variable, Matrix3<f64>)> {
         let state = ArmState::new(data, motion.row, &motion.posture, motion.point);
-        let mut beyond = BeyondFitted::new(robot.joints());
+        let mut beyond = BeyondRange::new(robot.joints());
         let mut out = Vec::new();
         for (effect, range) in &self.effects {
             let (Some(form), p) = (effect.form(), &x[range.clone()]) else { continue };

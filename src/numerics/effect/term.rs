@@ -2,7 +2,7 @@
 
 use super::form::Placed;
 use super::law::Factor;
-use super::{ArmState, Basis, BeyondFitted, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
+use super::{ArmState, Basis, BeyondRange, Cause, Deflection, Form, Law, Motion, NumberSpec, Place, Survey, Variable};
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
@@ -155,7 +155,7 @@ impl Placed for Term {
         state: &ArmState,
         p: &[f64],
         _within: &[Option<[f64; 2]>],
-        out: &mut BeyondFitted,
+        out: &mut BeyondRange,
     ) -> Option<Variable> {
         let (of, groups) = self.law.beyond(robot, state)?;
         let count = self.law.count();

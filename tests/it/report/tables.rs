@@ -223,7 +223,7 @@ fn formulas() -> Forms {
         price: 10,
         folds_rms_mm: 0.021,
         curve_rms_mm: 0.022,
-        without_rms_mm: 0.055,
+        without_rms_mm: Some(0.055),
         proposed: true,
         value,
         unit: unit.into(),

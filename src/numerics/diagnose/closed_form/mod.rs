@@ -41,12 +41,15 @@ impl FormulaSearch<'_, '_> {
 
     fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
         let nameless = |form: &Form| form.cause().is_nameless();
-        if finding.forms.is_empty() || !finding.forms.iter().all(nameless) {
+        // What it has elsewhere are details of the model.
+        let own: Vec<&Form> = finding.forms.iter().filter(|form| form.place() == finding.place).collect();
+        if own.is_empty() || !own.iter().all(|form| nameless(form)) {
             return None;
         }
         let causes = &self.state.causes;
-        let members: Vec<usize> = (0..causes.len()).filter(|i| finding.forms.contains(&causes[*i].form)).collect();
-        let (place, variables) = self.variables(finding)?;
+        let members: Vec<usize> = (0..causes.len()).filter(|i| own.contains(&&causes[*i].form)).collect();
+
+        let (place, variables) = self.variables(&own)?;
         let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
         let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
         let beside = FormRegression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
@@ -57,16 +60,18 @@ impl FormulaSearch<'_, '_> {
             .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &beside))
             .collect();
         let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
+
         let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
         let near = alternatives.near()?;
-        let without = near.errors(&members, None)?.rms();
+        // Where nothing near the model does without them, all that is known is that it is worse than any formula.
+        let without = near.errors(&members, None).map(|errors| errors.rms());
         let curve = FoldErrors::of(self.state, self.fitter)?.rms();
         let priced = |(k, candidate): (usize, &Candidate)| Priced {
             price: candidate.price,
             error: near.errors(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
         };
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
-        let (shown, chosen) = front(&priced, [without, curve])?;
+        let (shown, chosen) = front(&priced, [without.unwrap_or(f64::INFINITY), curve])?;
         let one = |(position, k): (usize, &usize)| ClosedForm {
             finding: at,
             declaration: candidates[*k].cause.declaration().clone(),
@@ -81,10 +86,10 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// The place as a declaration has it, and the variables, where they are one or two.
-    fn variables(&self, finding: &Finding) -> Option<(String, Vec<NamedVariable>)> {
+    fn variables(&self, own: &[&Form]) -> Option<(String, Vec<NamedVariable>)> {
         let mut joint = None;
         let mut variables: Vec<Variable> = Vec::new();
-        for form in &finding.forms {
+        for form in own {
             let term = form.term()?;
             let Motion::Joint { joint: own } = term.motion() else { return None };
             joint = Some(own);

@@ -32,7 +32,7 @@ pub(super) struct UnitColumns {
 }
 
 /// A direction in which a motion moves the rows.
-struct Direction {
+struct WeighedDirection {
     /// By a unit, weighed, residual rows of readings.
     weighed: Vec<f64>,
     /// Squared motion of each row by a unit, its share in the mean over the rows.
@@ -54,7 +54,7 @@ pub(super) struct SearchRows<'a> {
     /// Variance of one number of a row, m2 or rad2, by which columns become sizes.
     variance: Vec<f64>,
     noise: NoiseShape,
-    directions: Vec<(Motion, Vec<Direction>)>,
+    directions: Vec<(Motion, Vec<WeighedDirection>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
@@ -120,7 +120,8 @@ impl<'a> SearchRows<'a> {
         let fresh: Vec<Motion> =
             motions.iter().filter(|motion| !self.directions.iter().any(|(other, _)| other == *motion)).copied().collect();
         let directions = |motion| problem.directions(motion).into_iter().map(|raw| self.direction(raw)).collect();
-        let fresh: Vec<(Motion, Vec<Direction>)> = fresh.into_par_iter().map(|motion| (motion, directions(motion))).collect();
+        let fresh: Vec<(Motion, Vec<WeighedDirection>)> =
+            fresh.into_par_iter().map(|motion| (motion, directions(motion))).collect();
         self.directions.extend(fresh);
         let fresh: Vec<Variable> =
             variables.iter().filter(|of| !self.values.iter().any(|(other, _)| other == *of)).copied().collect();
@@ -170,7 +171,7 @@ impl<'a> SearchRows<'a> {
         let (_, directions) = self.directions.iter().find(|(motion, _)| *motion == term.motion())?;
         let functions = self.functions(term.law())?;
         let mut fit = 0.0;
-        for Direction { weighed, .. } in directions {
+        for WeighedDirection { weighed, .. } in directions {
             let of_row = |i: usize| {
                 let lines = self.view.problem.readings_of(i);
                 let sums = lines.map(|line| [weighed[line] * left[line], weighed[line] * weighed[line]]);
@@ -187,7 +188,7 @@ impl<'a> SearchRows<'a> {
     }
 
     /// What is needed of a direction of a motion by a unit.
-    fn direction(&self, mut raw: Vec<f64>) -> Direction {
+    fn direction(&self, mut raw: Vec<f64>) -> WeighedDirection {
         raw.truncate(self.view.problem.of_readings().len());
         let count = self.variance.len().max(1) as f64;
         let of_row = |(i, variance): (usize, &f64)| {
@@ -197,7 +198,7 @@ impl<'a> SearchRows<'a> {
         if !self.view.problem.is_correlated() {
             self.weigh(&mut raw);
         }
-        Direction { weighed: raw, square }
+        WeighedDirection { weighed: raw, square }
     }
 
     /// The columns of a law at a place from the motion's directions and the law's functions.
