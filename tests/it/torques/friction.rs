@@ -56,7 +56,7 @@ fn gap(store: &Path, stage: &str) -> (String, [f64; 2]) {
     let Findings(rows) = table(store, &format!("{stage}/findings"));
     let FindingNumbers(numbers) = table(store, &format!("{stage}/finding_numbers"));
     let place = format!("joint {JOINT}");
-    let named: Vec<String> = rows.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
+    let named: Vec<String> = rows.iter().map(|row| row.statement.clone()).collect();
     let found = rows.into_iter().find(|row| row.effect == "backlash" && row.place == place);
     let found = found.unwrap_or_else(|| panic!("no gap but {named:?}"));
     let half = numbers.into_iter().find(|number| number.rank == found.rank).expect("its size");

@@ -214,7 +214,8 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         all.into_iter().take(most).map(|(_, cell)| cell).collect()
     }
 
-    /// Cells over the variable of a component at its place or next to it: columns that are looked at coarsely do not show how alike fine curves are.
+    /// Cells with a name at the place of a component, and of a curve those over its variable there or next to it: columns that are looked at
+    /// coarsely do not show how alike fine curves are.
     pub fn near(&self, own: &Component) -> Vec<usize> {
         let of = |cell: &CauseCell| match &cell.shapes {
             Shapes::Free(FreeShape { of, over: Over::Curve { .. }, .. }) => Some(*of),
@@ -233,12 +234,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             _ => None,
         };
         let cell = &self.cells[own.cell];
-        let (Some(variable), Some(place), Shapes::Free(_)) = (of(cell), along(cell.place), &cell.shapes) else {
-            return Vec::new();
+        let free = matches!(cell.shapes, Shapes::Free(_));
+        let variable = of(cell).filter(|_| free);
+        let near = |other: &CauseCell| match (along(cell.place), along(other.place)) {
+            (Some(place), Some(at)) => variable.is_some() && of(other) == variable && place.abs_diff(at) <= 2,
+            _ => false,
         };
-        let near =
-            |other: &CauseCell| of(other) == Some(variable) && along(other.place).is_some_and(|at| place.abs_diff(at) <= 2);
-        (0..self.cells.len()).filter(|k| near(&self.cells[*k])).collect()
+        let named_here = |other: &CauseCell| other.is_named() && other.place == cell.place;
+        (0..self.cells.len()).filter(|k| near(&self.cells[*k]) || named_here(&self.cells[*k])).collect()
     }
 
     /// The same of a block's columns, from the components that the state has.
