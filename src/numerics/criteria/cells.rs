@@ -13,8 +13,9 @@ criteria! {
     RARER: f64 = 0.002, "odds", "judgement: a tenth of the common ones", "";
     /// Prior odds of all cells without a name at a place together.
     UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
-    /// Rows with fewer than which no cell without a name is asked: a free curve bends what geometry leaves open.
-    OPEN: usize = 30, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
+    /// Rows with fewer than which cells without a name are asked only where the others leave more than noise: a free curve bends what geometry
+    /// leaves open.
+    OPEN: usize = 60, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
     /// Probability of a cause in no list for which these odds are.
     USUAL: f64 = 0.3, "probability", "judgement: the default of the setting `open_world`", "";
     /// Prior odds of a product without a name, where one of its variables already shows there.

@@ -19,7 +19,7 @@ pub(crate) struct FoundCell {
     pub place: Place,
     /// Positions of its forms among the causes of the model.
     pub members: Vec<usize>,
-    /// ln of the evidence for it beside all others.
+    /// ln of the evidence for it given all others.
     pub log: f64,
     /// What its freedom costs: by how much -2 ln of its evidence is more than that of its best fit.
     pub price: f64,
@@ -92,7 +92,7 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// The finding of some components: names and places beside all others, at a noise.
+    /// The finding of some components: names and places given all others, at a noise.
     fn found(&self, components: &[Component], members: &[usize], kappa: f64) -> FoundCell {
         let others = without(components, members);
         let rest: Vec<&Component> = others.iter().collect();
@@ -107,8 +107,8 @@ impl CauseTable<'_, '_> {
         let mut known = rest.clone();
         known.push(&components[main]);
         for i in members.iter().copied().filter(|i| *i != main) {
-            let beside = self.state(&known, Some(kappa));
-            log += log_of(i, &beside, &known).max(0.0);
+            let given = self.state(&known, Some(kappa));
+            log += log_of(i, &given, &known).max(0.0);
             known.push(&components[i]);
         }
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);

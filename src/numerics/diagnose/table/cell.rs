@@ -43,7 +43,7 @@ pub(super) struct CellShape {
     pub shares: Vec<f64>,
     /// ln of the weight of the shape within its cell.
     pub log_weight: f64,
-    /// Whether it has further numbers beside the plain shapes of its cell.
+    /// Whether it has further numbers in addition to the plain shapes of its cell.
     pub is_bent: bool,
 }
 

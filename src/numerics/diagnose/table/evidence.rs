@@ -40,15 +40,15 @@ impl GroupEvidence {
 pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: EvidenceRows) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
     let scaled;
-    let (diagonal, beside, along) = if let [k] = kept[..] {
+    let (diagonal, off_diagonal, along) = if let [k] = kept[..] {
         scaled = (vec![shares[k] * gram[(k, k)]], Vec::new(), vec![shares[k].sqrt() * gradient[k]]);
         (&scaled.0, &scaled.1, &scaled.2)
     } else {
         let roots: Vec<f64> = kept.iter().map(|k| shares[*k].sqrt()).collect();
         let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| roots[i] * gram[(kept[i], kept[j])] * roots[j]);
         let mut along: Vec<f64> = kept.iter().zip(&roots).map(|(k, root)| root * gradient[*k]).collect();
-        let (diagonal, beside) = tridiagonal(matrix, &mut along);
-        scaled = (diagonal, beside, along);
+        let (diagonal, off_diagonal) = tridiagonal(matrix, &mut along);
+        scaled = (diagonal, off_diagonal, along);
         (&scaled.0, &scaled.1, &scaled.2)
     };
     let trace: f64 = diagonal.iter().sum();
@@ -59,7 +59,7 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f
     let (mut logs, mut fits) = ([0.0; AMPLITUDES], [0.0; AMPLITUDES]);
     for ((log, fit_there), amplitude) in logs.iter_mut().zip(&mut fits).zip(amplitudes()) {
         let square = amplitude * amplitude;
-        let (fit, determinant) = at_amplitude(square, diagonal, beside, along);
+        let (fit, determinant) = at_amplitude(square, diagonal, off_diagonal, along);
         *fit_there = fit;
         // Noise is always left: what leaves none is rounding.
         let left = 1.0 - fit / whole;

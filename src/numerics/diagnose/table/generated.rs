@@ -3,7 +3,7 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::frame::SearchRows;
-use crate::criteria::cells::{FADING, LIMITS, OPEN, PAIR, PRODUCT, UNNAMED, USUAL};
+use crate::criteria::cells::{FADING, LIMITS, PAIR, PRODUCT, UNNAMED, USUAL};
 use crate::diagnose::types::Question;
 use crate::effect::{Axes, AxisPoint, Motion, Place, Polar, Survey, Variable, names};
 use crate::observation::only_brought;
@@ -36,14 +36,14 @@ const SLOW: Over = Over::Curve { count: 8, first: 4, lengths: 2 };
 type Kind = Vec<(Variable, Over)>;
 
 /// All cells of one variable.
-pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question) -> Vec<CauseCell> {
+pub(super) fn cells(survey: &Survey, frame: &mut SearchRows, question: &Question, is_open: bool) -> Vec<CauseCell> {
     let odds = |probability: f64| probability / (1.0 - probability);
     let unnamed = *UNNAMED * odds(question.open_world) / odds(*USUAL);
     let left_out = |name: &str| question.without.iter().any(|out| out == name);
     let mut out = Vec::new();
     let varies = |frame: &SearchRows, of: Variable| frame.values(of).is_some_and(|values| super::cell::line(&values).is_some());
     // Where nothing but joints was recorded, an arm that is smaller closes as well, and whatever follows the place of the tool looks so.
-    let closed = only_brought(survey.data, survey.rows) || survey.rows.len() < *OPEN;
+    let closed = only_brought(survey.data, survey.rows) || !is_open;
     let places = if closed { Vec::new() } else { places(survey) };
     for place in places {
         let families = families(place, survey);

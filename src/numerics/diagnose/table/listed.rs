@@ -87,7 +87,7 @@ fn unusual(hypotheses: &[Hypothesis]) -> f64 {
     0.5 * (least - *effect::RARE).max(0.0)
 }
 
-/// The forms of a cell, weighed by how many like them are tried and how rare they are beside each other.
+/// The forms of a cell, weighed by how many like them are tried and how rare they are among each other.
 fn weighed(hypotheses: Vec<Hypothesis>, robot: &RobotModel) -> Vec<ShapeGroup> {
     let weight = |hypothesis: &Hypothesis| (-0.5 * hypothesis.prior_penalty).exp() / hypothesis.tried;
     let sum: f64 = hypotheses.iter().map(weight).sum();

@@ -2,7 +2,7 @@
 //! or without, compete by one evidence.
 //!
 //! A cell's shapes share one unit of prior weight, so that a cause pays for being there and not for the number of its shapes; components
-//! that were accepted sit in the covariance of the rows, and every other cell is asked beside them.
+//! that were accepted sit in the covariance of the rows, and every other cell is asked given them.
 
 mod answer;
 mod cell;
@@ -21,7 +21,7 @@ pub(crate) use forms::forms_of;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;
-use crate::criteria::cells::{IDLE, ROUNDS, UNEXPLAINED};
+use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
 use crate::effect::{Basis, Form, Law, Motion, Place, Variable, names};
 use crate::estimate::Prior;
 use crate::observation::only_brought;
@@ -36,6 +36,8 @@ pub(crate) struct Rounds {
     /// Components with the keys of their cells.
     components: Vec<(String, Component)>,
     shown: Vec<FreeShape>,
+    /// Whether cells without a name are asked of few rows, too.
+    is_open: bool,
     /// Products of two variables that show together; none before they were looked for.
     pairs: Option<Vec<FreeShape>>,
     first: Option<(Located, f64)>,
@@ -85,7 +87,8 @@ impl Rounds {
         };
         let all_pairs = if self.pairs.is_none() { generated::pairs(&survey, &mut frame) } else { Vec::new() };
         let products = (&self.shown[..], self.pairs.as_deref().unwrap_or_default());
-        let mut table = CauseTable::new(&mut frame, &survey, question, products, keeps);
+        let is_open = self.is_open || survey.rows.len() >= *OPEN;
+        let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
         let before: Vec<String> = self.components.iter().map(|(key, _)| key.clone()).collect();
         table.from_before.clone_from(&before);
         let mut components = Vec::new();
@@ -121,13 +124,18 @@ impl Rounds {
         let shown = table.shown(&components);
         let is_settled = sorted(&keys) == sorted(&before) && shown.len() <= self.shown.len();
         let mut is_last = components.is_empty() || is_settled && self.round > 1 || self.round >= *ROUNDS;
-        if is_last && self.pairs.is_none() {
+        if is_last && !(is_open && self.pairs.is_some()) {
             let all: Vec<&Component> = components.iter().collect();
             let state = table.state(&all, None);
             let unexplained = state.kappa > *UNEXPLAINED && !brought;
-            let seen = if unexplained { table.seen_pairs(&all_pairs, &state, &all) } else { Vec::new() };
-            is_last = seen.is_empty();
-            self.pairs = Some(seen);
+            if !is_open {
+                self.is_open = unexplained;
+                is_last = !unexplained;
+            } else if self.pairs.is_none() {
+                let seen = if unexplained { table.seen_pairs(&all_pairs, &state, &all) } else { Vec::new() };
+                is_last = seen.is_empty();
+                self.pairs = Some(seen);
+            }
         }
         let answer = is_last.then(|| table.answer(&components, self.first.clone().unwrap_or_default()));
         let mut causes = estimated(&table, &components);

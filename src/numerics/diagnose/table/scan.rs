@@ -1,4 +1,4 @@
-//! All cells of a recording with their columns, and what each of them says beside the components of a model.
+//! All cells of a recording with their columns, and what each of them says given the components of a model.
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::evidence::log_sum;
@@ -35,7 +35,7 @@ pub(super) struct CauseTable<'f, 'a> {
     pub multiplied: Vec<FreeShape>,
 }
 
-/// What a cell says beside a state, with its likeliest shape.
+/// What a cell says given a state, with its likeliest shape.
 #[derive(Clone)]
 pub(super) struct CellEvidence {
     /// ln of the evidence, all shapes mixed.
@@ -52,7 +52,7 @@ pub(super) struct CellEvidence {
 /// A shape with the numbers of which the rows say most: its forms, ln of its evidence, its amplitude.
 pub(super) type Refined = (Vec<Form>, f64, f64);
 
-/// ln of posterior odds of every cell beside a state.
+/// ln of posterior odds of every cell given a state.
 pub(super) struct CellScan {
     /// Minus infinity of cells that are not asked.
     pub log_odds: Vec<f64>,
@@ -76,9 +76,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         survey: &'f Survey<'f>,
         question: &Question,
         (shown, pairs): (&[FreeShape], &[FreeShape]),
+        is_open: bool,
         keeps: impl Fn(&CauseCell) -> bool,
     ) -> Self {
-        let mut cells = generated::cells(survey, frame, question);
+        let mut cells = generated::cells(survey, frame, question, is_open);
         cells.extend(generated::products(shown, survey, frame));
         let mut known: BTreeSet<String> = cells.iter().map(|cell| cell.key.clone()).collect();
         cells.extend(generated::pair_cells(pairs).into_iter().filter(|cell| known.insert(cell.key.clone())));
@@ -160,7 +161,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
     }
 
-    /// L^-1 Z'X of all coarse columns beside a state.
+    /// L^-1 Z'X of all coarse columns given a state.
     pub fn across(&self, state: &KnownState) -> DMatrix<f64> {
         let all: Vec<usize> = (0..self.cells.len()).collect();
         self.across_cells(&all, state).0
@@ -264,7 +265,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         KnownState::of(components, &self.parts, self.frame, kappa)
     }
 
-    /// The evidence of a cell in all of its shapes beside a state of some components.
+    /// The evidence of a cell in all of its shapes given a state of some components.
     pub fn closely(&self, cell: usize, state: &KnownState, components: &[&Component]) -> Option<CellEvidence> {
         let block = self.fine(cell);
         let across = self.across_block(block, state, components);
@@ -287,14 +288,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         Some(CellEvidence { log, bent, shape: (best.1, best.2), amplitude: best.3, refined: None })
     }
 
-    /// The odds of every cell beside a state, closely those of the best and of some more. A cell that has a component already has no price for
+    /// The odds of every cell given a state, closely those of the best and of some more. A cell that has a component already has no price for
     /// another one.
     pub fn scan(&self, state: &KnownState, components: &[&Component], most: usize, also: &[usize]) -> CellScan {
         let all: Vec<usize> = (0..self.cells.len()).collect();
         self.scan_some(&all, state, components, most, also)
     }
 
-    /// The odds of cells that do much of what a component does, beside a state without it.
+    /// The odds of cells that do much of what a component does, given a state without it.
     pub fn scan_alike(
         &self,
         own: &Component,
@@ -437,7 +438,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         Component { cell, ..self.with_forms(before, before.forms.clone()) }.with_part(self.next)
     }
 
-    /// ln of the evidence of one shape with its weight beside a state, and its amplitude.
+    /// ln of the evidence of one shape with its weight given a state, and its amplitude.
     pub fn of_component(&self, own: &Component, state: &KnownState, others: &[&Component]) -> Option<(f64, f64)> {
         let block = CellColumns::of_component(own, self.frame);
         let across = self.across_block(&block, state, others);

@@ -1,4 +1,4 @@
-//! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell beside all others.
+//! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell given all others.
 
 use super::cell::{FreeShape, Over, Shapes};
 use super::evidence::AMPLITUDES;
@@ -11,7 +11,7 @@ use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
 
 impl CauseTable<'_, '_> {
-    /// Every component anew beside all others: shape and amplitude.
+    /// Every component anew given all others: shape and amplitude.
     pub fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
         let all = (0..components.len()).collect::<Vec<_>>();
         self.backfit_some(components, &all, rounds)
@@ -150,7 +150,7 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// ln of the odds of a component beside all others.
+    /// ln of the odds of a component given all others.
     fn log_odds_of(&self, components: &[Component], i: usize, kappa: f64) -> f64 {
         let others = without(components, &[i]);
         let others: Vec<&Component> = others.iter().collect();

@@ -320,7 +320,7 @@ impl KnownState {
         (gram, gradient)
     }
 
-    /// Standard error of each coefficient (SI) of a block of one group beside the components.
+    /// Standard error of each coefficient (SI) of a block of one group given the components.
     pub fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else { return Vec::new() };
         let (gram, _) = self.seen(group, across, 0);
