@@ -1,4 +1,4 @@
-//! Least squares on one form at a time beside a model, which takes its part of the rows first (Frisch, Waugh, Lovell): a coefficient on what
+//! Least squares on one form at a time given a model, which takes its part of the rows first (Frisch, Waugh, Lovell): a coefficient on what
 //! the model cannot absorb is the one that a joint fit with it would give.
 
 use super::linear::{dot, orthonormal, project};
@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// What is left of a squared column of unit length below this is rounding and second order.
+/// A remainder of a squared column of unit length below this is rounding and second order.
 const INVISIBLE: f64 = 1e-6;
 
 /// Rows, and what a model leaves of them.
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_fit_beside_a_model_is_the_joint_one_and_what_is_invisible_is_left_out() {
-        // y = 3 a - 2 b + 0.5 c, where the model absorbs a, and d = b + c is not seen beside b and c.
+        // y = 3 a - 2 b + 0.5 c, where the model absorbs a, and d = b + c is not seen given b and c.
         let column =
             |k: usize| -> Vec<f64> { (0..9).map(|i| ((3 * i + 5 * k * k + 2 * i * k) % 7) as f64 / 7.0 - 0.4).collect() };
         let (mut a, b, c) = (column(0), column(1), column(2));

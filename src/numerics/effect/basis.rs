@@ -119,7 +119,7 @@ impl Basis {
     /// is `share` of that, and the function has `value`.
     ///
     /// A curve is held at the end of its range: a smooth one of its spectrum departs from that by p sqrt(1 - cos(k pi off / width)) up to where
-    /// it knows nothing of it. All else may be off by what it is, one range beyond.
+    /// it knows nothing of it. All else may be off by its own value, one range beyond.
     pub(super) fn off(&self, k: usize, value: f64, off: f64, share: f64) -> f64 {
         match *self {
             Self::Cosines { low, high, .. } => departure(k + 1, off / (high - low)),

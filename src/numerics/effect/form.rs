@@ -98,7 +98,7 @@ pub trait Placed: Send + Sync {
         out.close(share * self.doubt());
         Some(of)
     }
-    /// The variable that a row takes furthest beyond its fitted range, and by what share of that, at most 1; none inside.
+    /// The variable that a row takes furthest beyond its fitted range, and the share of that, at most 1; none inside.
     fn most_beyond(&self, robot: &RobotModel, state: &ArmState, within: &[Option<[f64; 2]>]) -> Option<(Variable, f64)> {
         let sizes = self.variables().into_iter().zip(self.sizes(robot, state)).zip(within);
         let shares = sizes.filter_map(|((of, size), range)| Some((of, of.share_beyond(size?, (*range)?))));
@@ -244,7 +244,7 @@ impl Form {
     }
 }
 
-/// Key of a form's ranges beside its place and shape.
+/// Key of a form's ranges, next to its place and shape.
 const WITHIN: &str = "within";
 
 impl Serialize for Form {

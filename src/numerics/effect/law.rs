@@ -69,7 +69,7 @@ impl Factor {
         out
     }
 
-    /// What each function may be off there, one standard deviation, and by what share of its range the variable is beyond; none inside.
+    /// What each function may be off there, one standard deviation, and the share of its range by which the variable is beyond; none inside.
     fn off(&self, robot: &RobotModel, state: &ArmState) -> Option<(Vec<f64>, f64)> {
         let (off, share) = self.beyond(robot, state)?;
         let values = self.all(robot, state).into_iter().enumerate();

@@ -34,7 +34,7 @@ pub struct LawRow {
     pub number: &'static str,
     /// One sigma of what is known of a number before any measurement, SI.
     pub sigma: f64,
-    /// What tells it from other laws of its cause that may stand beside it; empty: the order of a wave, else nothing.
+    /// What distinguishes it from other laws of its cause in one model; empty: the order of a wave, else nothing.
     pub variant: &'static str,
     /// What a mechanic is told of it: words with holes such as `{value}`.
     pub says: &'static str,

@@ -1,4 +1,4 @@
-//! Lost motion by what leaves a joint on one side of its play: the load, friction under smaller loads than some threshold, or friction that
+//! Lost motion by the cause that leaves a joint on one side of its play: the load, friction under smaller loads than some threshold, or friction that
 //! fades in over a travel after each reversal (Dahl).
 
 use super::basis::around;

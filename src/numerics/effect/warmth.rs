@@ -4,7 +4,7 @@ use super::basis::around;
 use super::{Basis, Clock, Law, Survey, Term, Variable};
 use crate::robot::Memory;
 
-/// By what a warmth is known.
+/// The source from which a warmth is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Warmth {
     /// The recorded temperature above the first one (K), at once or with a lag: what was measured need not be what grows.

@@ -55,7 +55,7 @@ impl ExternalAxes {
         }
     }
 
-    /// Fails where one of them moved, beside so many joints of the arm.
+    /// Fails where one of them moved, in addition to so many joints of the arm.
     pub(super) fn must_stand(&self, label: &str, joints: usize) -> Result<()> {
         let moves = |(.., unit, [least, most]): &&(usize, String, &str, [f64; 2])| {
             most - least > STILL[usize::from(matches!(*unit, "rad" | "m"))]

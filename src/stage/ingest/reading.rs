@@ -67,7 +67,7 @@ pub(super) struct OpenedFile<'a> {
     is_ahead: bool,
     /// What was left out of the file as a whole.
     remark: Option<String>,
-    /// Axes beside the arm's that nothing is read from.
+    /// Axes in addition to the arm's that nothing is read from.
     pub external: ExternalAxes,
     pub row: RecordedRow,
 }

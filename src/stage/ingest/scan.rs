@@ -117,7 +117,7 @@ impl Scan {
     }
 }
 
-/// Reads the files of a measurement once, beside each other; each may hold rows of so many bytes in all.
+/// Reads the files of a measurement once, in parallel; each may hold rows of so many bytes in all.
 pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: &Context) -> Result<Vec<Scan>> {
     let (mut opened, mut sizes) = (Vec::new(), Vec::new());
     for layout in &settings.files {

@@ -147,7 +147,7 @@ impl<'a> Fitter<'a> {
         self.free.iter().chain(&self.faint).copied().collect()
     }
 
-    /// Takes the base parameters that the rows show around a fitted model: beside a large effect that the model lacked they could not be seen.
+    /// Takes the base parameters that the rows show around a fitted model: a large effect that the model lacked had hidden them.
     /// Those that they hardly show are not estimated.
     pub fn follow(&mut self, state: &FitState) {
         let first = state.ranges.first().map_or(state.model.x.len(), |range| range.start);

@@ -40,7 +40,7 @@ impl<'a> RoundView<'a> {
         Survey::new(robot, data, rows, &self.torque, &self.compliance)
     }
 
-    /// What is left of the rows without the causes of a model.
+    /// The residual of the rows without the causes of a model.
     pub fn without_causes(&self, now: &FitState) -> Vec<f64> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();

@@ -26,7 +26,7 @@ const OF_MOST_ARMS: [&str; 11] = [
     names::TRACKER_ELEVATION,
 ];
 
-/// ln of the prior odds of a cell of a cause, those of a user's own as of a common one; `weight` is by what rarity is multiplied.
+/// ln of the prior odds of a cell of a cause, those of a user's own as of a common one; `weight` multiplies the rarity.
 fn log_prior(name: &str, place: Place, weight: f64) -> f64 {
     let odds = match name {
         names::CABLE_DRAG => *RARER,

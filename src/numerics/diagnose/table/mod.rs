@@ -78,7 +78,7 @@ impl Rounds {
         let slow = |form: &Form| form.variables().contains(&Variable::Time);
         let brought = only_brought(&fitter.data, question.fit);
         let keeps = |cell: &cell::CauseCell| {
-            // Where nothing but joints was recorded, base and first joint move with all that the target was brought to.
+            // Where nothing but joints was recorded, base and first joint move with all places that the target was laid into.
             let unseen =
                 brought && (cell.place == Place::Base || cell.place == Place::Joint(0) && cell.name == names::ZERO_SHIFT);
             let values = |of| view.problem.values(of);
