@@ -52,12 +52,12 @@ impl FormulaSearch<'_, '_> {
         let (place, variables) = self.variables(&own)?;
         let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
         let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
-        let beside = FormRegression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
+        let given = FormRegression::new(problem, &jacobian, &rest, &self.view.without_causes(self.state));
         let Place::Joint(joint) = finding.place else { return None };
         let unit = if self.survey.robot.is_revolute(joint) { "rad" } else { "mm" };
         let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
             .iter()
-            .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &beside))
+            .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given))
             .collect();
         let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
 
@@ -80,7 +80,7 @@ impl FormulaSearch<'_, '_> {
             curve,
             without,
             chosen: Some(position) == chosen,
-            numbers: self.numbers(&candidates[*k], &variables, &beside, near.coefficients(&members, *k)),
+            numbers: self.numbers(&candidates[*k], &variables, &given, near.coefficients(&members, *k)),
         };
         Some(shown.iter().enumerate().map(one).collect())
     }
@@ -131,15 +131,15 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// A declared law at the place of the finding, its shape numbers where they fit best.
-    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &FormRegression) -> Option<Candidate> {
+    fn candidate(&self, cause: &'static DeclaredCause, place: Place, given: &FormRegression) -> Option<Candidate> {
         let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
-        let gains = beside.gains(&forms);
+        let gains = given.gains(&forms);
         let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best start need not lead to the best shape.
-        let ends: Vec<Form> = starts.into_iter().take(*STARTS).map(|(_, form)| beside.refined(form, self.survey)).collect();
-        let gains = beside.gains(&ends);
+        let ends: Vec<Form> = starts.into_iter().take(*STARTS).map(|(_, form)| given.refined(form, self.survey)).collect();
+        let gains = given.gains(&ends);
         let (_, form) = gains.into_iter().zip(ends).max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate { cause, form, price: cause.price() })
     }
@@ -155,11 +155,11 @@ impl FormulaSearch<'_, '_> {
         &self,
         candidate: &Candidate,
         variables: &[NamedVariable],
-        beside: &FormRegression,
+        given: &FormRegression,
         coefficients: Option<Vec<(f64, f64)>>,
     ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;
-        let sigmas = shape_sigmas(form, beside);
+        let sigmas = shape_sigmas(form, given);
         let shape = form.shape_numbers().into_iter().zip(sigmas);
         let mut out: Vec<ParameterEstimate> = shape
             .map(|((name, value), sigma)| {

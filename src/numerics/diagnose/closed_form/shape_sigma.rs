@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 const STEP: f64 = 1e-3;
 
 /// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
-pub(super) fn shape_sigmas(form: &Form, beside: &FormRegression) -> Vec<Option<f64>> {
+pub(super) fn shape_sigmas(form: &Form, given: &FormRegression) -> Vec<Option<f64>> {
     let Some(declared) = form.declared() else { return Vec::new() };
     let steps = declared.shape_steps(STEP);
     let count = steps.len();
@@ -24,7 +24,7 @@ pub(super) fn shape_sigmas(form: &Form, beside: &FormRegression) -> Vec<Option<f
     let pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
     let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
     let forms: Vec<Form> = pairs.iter().flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)]))).collect();
-    let gains = beside.gains(&forms);
+    let gains = given.gains(&forms);
     // Squares of whitened residuals fall by the gain: half of their second derivatives is the information.
     let mut information = DMatrix::zeros(count, count);
     for ((a, b), gain) in pairs.into_iter().zip(gains.chunks(4)) {
