@@ -39,7 +39,7 @@ criteria! {
     /// By how much ln of the posterior odds has to be larger for another cell to take the place of one.
     SWAPS: f64 = 0.1, "ln of odds", "judgement: no exchange to and fro", "";
     /// ln of the evidence by which a shape with further numbers must be better than a plain one.
-    BENDS: f64 = 4.0, "ln of evidence", "literature: strong, Kass and Raftery (1995), for one number", "";
+    BENDS: f64 = 6.0, "ln of evidence", "measured: a load that is off by some percent bends a straight spring by up to 6", "";
     /// That the evidence misleads: true shapes, places and noise differ a little from every cell's.
     MISLED: f64 = 0.03, "probability", "judgement: until it is measured on concealed recordings", "";
     /// Share of the probability of a name that another cause has which does the same in whatever data.

@@ -77,7 +77,9 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             rounds.again();
             continue;
         }
-        if let Some(sigma) = settled.then(|| fitter.noise_left_by(&next)).flatten() {
+        // What is left and nothing explains may be a noise that is misjudged.
+        let quiet = settled || answer.found.is_empty();
+        if let Some(sigma) = quiet.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);
             fitter.follow(&now);

@@ -30,6 +30,9 @@ pub struct Lag {
     each: bool,
     #[serde(default)]
     by: Behind,
+    /// The joint (from 0) that alone lags; none where all do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    only: Option<usize>,
 }
 
 /// s: clocks farther apart belong to other postures altogether.
@@ -52,10 +55,14 @@ pub(super) static CAUSE: Cause = Cause {
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     if survey.moves() {
         // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
-        return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock }, 1).within(LARGEST)];
+        return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock, only: None }, 1).within(LARGEST)];
     }
-    let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)];
-    laws.map(|(each, by)| Hypothesis::new(Lag { each, by }, laws.len())).to_vec()
+    let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)].map(|(each, by)| (each, by, None));
+    let turning: Vec<usize> = survey.revolute().filter(|joint| survey.travel(*joint) > 0.0).collect();
+    let all = laws.into_iter().map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len() + 1));
+    let tried = (laws.len() + 1) * turning.len();
+    let one = turning.iter().map(|joint| Hypothesis::new(Lag { each: false, by: Behind::Move, only: Some(*joint) }, tried));
+    all.chain(one).collect()
 }
 
 fn sentence(summary: &Summary) -> String {
@@ -75,6 +82,15 @@ fn sentence(summary: &Summary) -> String {
              shares of it",
             figure(n.value, 0)
         ),
+        Some(n)
+            if let Some(joint) =
+                n.name.rsplit_once("share_j").map(|(_, joint)| joint).filter(|_| summary.parameters.len() == 1) =>
+        {
+            format!(
+                "joint {joint} was logged before it had settled: {} % of its last move was still to come",
+                figure(n.value * 100.0, 2)
+            )
+        }
         Some(n) if summary.parameters.len() == 1 => format!(
             "joints were logged before the arm had settled: {} % of the last move was still to come",
             figure(n.value * 100.0, 2)
@@ -96,6 +112,9 @@ impl Placed for Lag {
     placed! { self: Place::Recording, &CAUSE, [if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }], self }
 
     fn numbers(&self, robot: &RobotModel) -> Vec<NumberSpec> {
+        if let Some(joint) = self.only {
+            return vec![(format!("share_j{}", joint + 1), Unit::One, 0.1)];
+        }
         match (self.by, self.each) {
             (Behind::Clock, _) => vec![("time".into(), Unit::Second, 0.01)],
             (Behind::Synchronous, _) => vec![("rest".into(), Unit::Radian, 0.01)],
@@ -106,7 +125,7 @@ impl Placed for Lag {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let largest = if self.by == Behind::Synchronous { state.largest_turn(robot) } else { 0.0 };
-        for joint in 0..robot.joints() {
+        for joint in (0..robot.joints()).filter(|joint| self.only.is_none_or(|only| only == *joint)) {
             match self.by {
                 Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
                 Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),

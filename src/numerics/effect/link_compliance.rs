@@ -1,11 +1,11 @@
-//! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
+//! `link_compliance`: link N bends under the moment of all that it carries, all along as a beam or at its middle; rad/Nm.
 
 use super::form::placed;
 use super::motion::{SHORT, extent};
 use super::{ArmState, Cause, Deflection, Form, Hypothesis, NumberSpec, OwnMotion, Place, Placed, Survey, Variable, names};
 use crate::criteria::effect::{RARE, STIFFNESS_BEYOND, UNLIKELY};
 use crate::robot::RobotModel;
-use crate::spatial::screw;
+use crate::spatial::{Twist, screw};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -14,8 +14,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bending {
-    /// Those across the link.
+    /// Those across the link, at its middle; in tables of earlier versions.
     AcrossLink,
+    /// Those across the link at each of its places: a beam that does not twist.
+    Beam,
+    /// Those across and along the link at each of its places, alike: a tube.
+    Tube,
     /// Those across the axis that moves it: what the joint's own compliance does not show.
     AcrossAxis,
     /// Two stiffnesses across that axis.
@@ -35,7 +39,7 @@ const WRIST: usize = 2;
 pub(super) static CAUSE: Cause = Cause {
     name: names::LINK_COMPLIANCE,
     place: "link",
-    formula: "the link bends about its far joint, by the moment there",
+    formula: "the link bends by the moment at each of its places, as a uniform beam",
     size: "0.05 to 1 urad/Nm",
     confounded: "joint_compliance of either end",
     needs: "link masses",
@@ -48,7 +52,7 @@ pub(super) static CAUSE: Cause = Cause {
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let n = survey.joints();
     let loaded = (0..n).any(|joint| survey.is_loaded(joint));
-    let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
+    let bendings = [Bending::Beam, Bending::Tube, Bending::AcrossAxis, Bending::TwoDirections];
     let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
     let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
     let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };
@@ -59,10 +63,21 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
 }
 
 impl BentLink {
-    /// The middle of the link, m, and the moment about that, Nm.
-    fn moment(&self, robot: &RobotModel, state: &ArmState) -> (Vector3<f64>, Vector3<f64>) {
-        let middle = robot.point(self.link) + extent(robot, self.link) * 0.5;
-        (middle, state.posture.moment(self.link + 1, &middle))
+    /// A place on the link, m, at a share of its length, and the moment about that, Nm.
+    fn moment(&self, robot: &RobotModel, state: &ArmState, share: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let place = robot.point(self.link) + extent(robot, self.link) * share;
+        (place, state.posture.moment(self.link + 1, &place))
+    }
+
+    /// What the moments at all places of the link turn beyond it by a unit, without those along `direction`. The moment is linear along the
+    /// link, the motion that it makes quadratic: Simpson's rule is exact.
+    fn beam(&self, robot: &RobotModel, state: &ArmState, without: Option<&Vector3<f64>>) -> Twist {
+        let at = |share: f64| {
+            let (place, moment) = self.moment(robot, state, share);
+            let along = without.map_or_else(Vector3::zeros, |direction| direction * direction.dot(&moment));
+            screw(&(moment - along), &place)
+        };
+        (at(0.0) + at(0.5) * 4.0 + at(1.0)) / 6.0
     }
 }
 
@@ -82,10 +97,12 @@ impl Placed for BentLink {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let along = extent(robot, self.link);
         let station = self.link + 1;
-        let (middle, moment) = self.moment(robot, state);
+        let (middle, moment) = self.moment(robot, state, 0.5);
         let without = |direction: &Vector3<f64>| moment - direction * direction.dot(&moment);
         match self.bending {
             Bending::AcrossLink => out.shift(0, p, station, screw(&without(&along.normalize()), &middle)),
+            Bending::Beam => out.shift(0, p, station, self.beam(robot, state, Some(&along.normalize()))),
+            Bending::Tube => out.shift(0, p, station, self.beam(robot, state, None)),
             Bending::AcrossAxis => out.shift(0, p, station, screw(&without(robot.axis(self.link)), &middle)),
             Bending::TwoDirections => {
                 for (k, (_, normal)) in robot.normals(self.link).iter().enumerate() {
@@ -96,7 +113,7 @@ impl Placed for BentLink {
     }
 
     fn sizes(&self, robot: &RobotModel, state: &ArmState) -> Vec<Option<f64>> {
-        vec![Some(self.moment(robot, state).1.norm())]
+        vec![Some(self.moment(robot, state, 0.5).1.norm())]
     }
 
     fn doubt(&self) -> f64 {

@@ -5,7 +5,7 @@ use super::evidence::AMPLITUDES;
 use super::scan::CauseTable;
 use super::state::{Component, KnownState};
 use crate::criteria::cells::{
-    CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
+    BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -54,7 +54,9 @@ impl CauseTable<'_, '_> {
                     continue;
                 }
                 let Some(other) = self.of_component(&found, &state, &others) else { continue };
-                if other.0 > own.0 + *SWAPS {
+                // A shape of further numbers stays on the terms on which it came.
+                let paid = |(log, _): (f64, f64), own: &Component| log - if own.shape.is_bent { *BENDS } else { 0.0 };
+                if paid(other, &found) > paid(own, &components[i]) + *SWAPS {
                     grid.refined = self.refined(components[i].cell, &grid, &state, &others);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;

@@ -34,7 +34,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     let left_at_fitted_rows =
         structured && misfit.chi_square > *MAX_CHI_SQUARE_OF_STRUCTURE || misfit.chi_square > *MAX_CHI_SQUARE || many_aside;
     let something_left = left_at_fitted_rows || misfit.not_carried.is_some();
-    let findings = findings(&last, left_at_fitted_rows);
+    let findings = findings(&last, left_at_fitted_rows, something_left);
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > *MAX_CHI_SQUARE_OF_STRUCTURE;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {

@@ -15,13 +15,14 @@ use crate::effect::{
 use crate::estimate::{Model, ParameterStatus, tail};
 use crate::observation::Dimension;
 
-/// The causes of the last round as findings, strongest first; `something_left` says whether they leave more than noise.
-pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
+/// The causes of the last round as findings, strongest first; whether they leave more than noise `at_fitted_rows` or anywhere.
+pub(super) fn findings(last: &LastRound, at_fitted_rows: bool, something_left: bool) -> Vec<Finding> {
     let state = &last.state;
     if let Some(offset) = state.screening.apart {
         return vec![rows_apart(offset, last)];
     }
-    let mut out: Vec<Finding> = without_details(last).iter().map(|(found, details)| finding(last, found, details)).collect();
+    let mut out: Vec<Finding> =
+        without_details(last, something_left).iter().map(|(found, details)| finding(last, found, details)).collect();
     let data = last.survey.data;
     let by_the_way_there = |form: &Form| match form.variables().first() {
         Some(Variable::LastMove) => true,
@@ -30,15 +31,16 @@ pub(super) fn findings(last: &LastRound, something_left: bool) -> Vec<Finding> {
     };
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
-    out.extend(faults(last, unknown, something_left));
+    out.extend(faults(last, unknown, at_fitted_rows));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
 }
 
 /// What was found, with the causes of the model that are a part of each but no numbers of it: what has no name and is small beside a finding
-/// at its place, or next to nothing beside the largest of all, is what the shapes of those leave.
-fn without_details(last: &LastRound) -> Vec<(FoundCell, Vec<usize>)> {
+/// at its place, or next to nothing beside the largest of all, is what the shapes of those leave. So is, as long as more than noise is left,
+/// whatever is weaker at the place of a finding without a name.
+fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
     let strongest = all.iter().map(|(_, found, _)| found.log).fold(0.0, f64::max);
@@ -50,12 +52,14 @@ fn without_details(last: &LastRound) -> Vec<(FoundCell, Vec<usize>)> {
             out[0].2.extend(&found.members);
             continue;
         }
+        let unclear = |main: &FoundCell| something_left && main.effect == names::UNKNOWN && found.log < main.log;
+        let of_unclear = out.iter().position(|(_, main, _)| main.place == found.place && unclear(main));
         let first = (found.effect == names::UNKNOWN).then(|| {
             let here = out.iter().position(|(most, main, _)| main.place == found.place && rms < *DETAIL * most);
             let trace = |(most, ..): &&(f64, FoundCell, Vec<usize>)| rms < *TRACE * most || found.log < *FAINT * strongest;
             here.or_else(|| out.first().filter(trace).map(|_| 0))
         });
-        match first.flatten() {
+        match of_unclear.or(first.flatten()) {
             Some(main) => out[main].2.extend(&found.members),
             None => out.push((rms, found, details)),
         }

@@ -15,6 +15,7 @@ use super::fit::{FitOptions, Fitted, fit};
 use super::model::Model;
 use super::problem::Problem;
 use crate::criteria::screen::{BEYOND_CROWD, BULK, CROWD, FAR, GROSS, NOMINAL_TOLERANCE, READMITTING};
+use crate::effect::Effect;
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
 use distance::{LeaveOneOut, leave_one_out};
@@ -155,15 +156,15 @@ fn screen(
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
     named.extend(beside(data, &named));
     let crowded = crowded(data, &named, set);
-    // What a free form does not follow is its own fault before it is a row's.
-    let nameless = model.stack.effects().filter_map(|(effect, _)| effect.form()).any(|form| form.cause().is_nameless());
+    // What a free form does not follow is its own fault before it is a row's, but where the row is off by more than such forms move any.
+    let free = if named.is_empty() { 0.0 } else { moved_by_free_forms(model, data) };
     let mut crowd = 0;
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let LeaveOneOut { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
         // A row that judges the model is not set aside by the model alone.
-        let needs_more = nameless || asked.binary_search(&row).is_err();
+        let needs_more = residual.norm() <= 2.0 * free || asked.binary_search(&row).is_err();
         let corroborated = corroborated::is_wrong(data, row, residual.norm());
         let among_many = crowded.contains(&set[row]) && *distance < *BEYOND_CROWD * limit && !held.contains(&row);
         if kind == SuspectKind::Outlier && (needs_more && !corroborated || among_many) {
@@ -184,6 +185,21 @@ fn screen(
     }));
     suspects.sort_by_key(|suspect| suspect.row);
     Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()), followed }
+}
+
+/// How far free forms move the point of any row at most, m.
+fn moved_by_free_forms(model: &Model, data: &Measurements) -> f64 {
+    let is_free = |effect: &dyn Effect| effect.form().is_some_and(|form| form.cause().is_nameless());
+    let mut x = model.x.clone();
+    for (_, range) in model.stack.effects().filter(|(effect, _)| is_free(*effect)) {
+        x[range].fill(0.0);
+    }
+    if x == model.x {
+        return 0.0;
+    }
+    let without = Model { x, ..model.clone() }.predict(data);
+    let moved = model.predict(data).into_iter().zip(without).map(|(with, without)| (with - without).norm());
+    moved.fold(0.0, f64::max)
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
