@@ -39,6 +39,9 @@ pub(super) struct DiagnoseArguments {
     /// The finding whose formula is written, by its number [default: the first that has one]
     #[arg(long, value_name = "N", requires = "export_effect")]
     finding: Option<i64>,
+    /// Writes the diagnosis as one HTML file, the table of causes first
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     /// Prints all of the diagnosis: where, probabilities of places, numbers, formulas, every rival, what cannot be observed and why
     #[arg(long, conflicts_with = "json")]
     details: bool,
@@ -54,6 +57,7 @@ const EXAMPLES: &str = "Examples:
   calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
   calib diagnose pipeline.yaml --json > diagnosis.json
   calib diagnose HEAD --details
+  calib diagnose HEAD --html diagnosis.html
   calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
@@ -101,6 +105,9 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         write_new(file, &told.effect_file(arguments.finding)?)?;
     }
     let store = arguments.means.store_again();
+    if let Some(file) = &arguments.html {
+        write_new(file, &told.page(&store)?)?;
+    }
     if arguments.json {
         emit_json(&told.document(&store))?;
     } else {

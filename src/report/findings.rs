@@ -69,6 +69,7 @@ pub(super) fn section(tables: &Tables) -> Option<Value> {
             errors(before, verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
             errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
         ],
+        "causes": tables.cells.last().zip(tables.findings.last()).and_then(|(cells, findings)| super::causes::picture(cells, findings)),
         "facts": facts(verdict),
         "findings": findings,
         // What each figure of the evidence means.
@@ -136,7 +137,7 @@ fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
 }
 
 /// A statement as a sentence of its own.
-fn sentence_case(statement: &str) -> String {
+pub(super) fn sentence_case(statement: &str) -> String {
     let mut letters = statement.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", letters.as_str())

@@ -4,6 +4,7 @@
 
 mod achieved;
 mod axis;
+mod causes;
 mod certificate;
 mod closure;
 mod corrections;
@@ -25,13 +26,14 @@ mod torques;
 mod workspace;
 
 pub use achieved::{AchievedTables, achieved_page};
+pub use causes::{DiagnosedTables, diagnosed_page};
 pub use language::{PageLanguage, Translation};
 pub use limits::AcceptanceLimits;
 pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{
-    Acceptance, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction,
+    Acceptance, Cells, Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction,
     Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, VerdictSentences, VerdictTopic,
     Withdrawn,
 };
@@ -78,6 +80,8 @@ pub struct Tables {
     pub rivals: Vec<Rivals>,
     /// Formulas of findings without a name.
     pub forms: Vec<Forms>,
+    /// The table of causes of every diagnosis.
+    pub cells: Vec<Cells>,
     /// Rows that were set aside.
     pub suspects: Vec<Suspects>,
     /// Findings over what reveals them.

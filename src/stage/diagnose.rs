@@ -16,7 +16,7 @@ use crate::stage::unmoved::must_move;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
-    Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
+    Cells, Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
     Spectrum, Split, Suspects, Verdict, VerdictSentences,
 };
 use schemars::JsonSchema;
@@ -90,6 +90,7 @@ crate::stage::writes! {
         rivals: Rivals,
         forms: Forms,
         shares: Shares,
+        cells: Cells,
         spectrum: Spectrum,
         parameters: Parameters,
         covariance: CovarianceTable,
@@ -102,7 +103,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 35;
+    const IMPLEMENTATION: u32 = 36;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -209,6 +210,7 @@ impl Stage for Diagnose {
             rivals: Rivals::of(&diagnosis),
             forms: Forms::of(&diagnosis),
             shares: Shares::of(&diagnosis),
+            cells: Cells::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
             parameters: parameters.correcting(corrected),
             covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),

@@ -6,7 +6,7 @@ use crate::report::{AcceptanceLimits, PageLanguage, ReportOptions, Tables, pages
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Acceptance, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake,
+    Acceptance, Cells, Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake,
     JointConventions, Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics,
     Step, Suspects, Table, Training, Unseen, Verdict, VerdictSentences, standing,
 };
@@ -66,6 +66,7 @@ reads! {
         finding_numbers: Vec<Labelled<FindingNumbers>>,
         rivals: Vec<Labelled<Rivals>>,
         forms: Vec<Labelled<Forms>>,
+        cells: Vec<Labelled<Cells>>,
         suspects: Vec<Labelled<Suspects>>,
     }
 }
@@ -81,7 +82,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 20;
+    const IMPLEMENTATION: u32 = 21;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -135,6 +136,7 @@ impl Stage for Report {
             finding_numbers: unlabelled(reads.finding_numbers),
             rivals: unlabelled(reads.rivals),
             forms: unlabelled(reads.forms),
+            cells: unlabelled(reads.cells),
             suspects: unlabelled(reads.suspects),
             curves,
             standing: standing.map(|[step, _]| step),

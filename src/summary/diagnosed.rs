@@ -50,6 +50,16 @@ impl Diagnosed {
         }
     }
 
+    /// The diagnosis as one HTML file; of torques it is in the report.
+    pub fn page(&self, store: &str) -> Result<String> {
+        match self {
+            Self::Positions(told) => told.page(store),
+            Self::Torques(_) => {
+                Err(Error::spec("--html", "of torques the page is the pipeline's report: put `- uses: report` last"))
+            }
+        }
+    }
+
     /// All of it, for a person.
     pub fn text(&self, store: &str) -> String {
         match self {

@@ -107,6 +107,7 @@ impl Findings {
             rank,
             effect: finding.effect.into(),
             place: finding.place.to_string(),
+            follows: finding.forms.first().map(|form| form.follows(finding.place).into()),
             statement: finding.statement.clone(),
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),

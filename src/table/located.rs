@@ -1,7 +1,8 @@
-//! Where the residual sits and what it depends on, before and after the findings: two tables.
+//! Where the residual sits and what it depends on, before and after the findings: three tables.
 
-use super::{ShareRow, Shares, Spectrum, SpectrumRow};
+use super::{CellRow, Cells, ShareRow, Shares, Spectrum, SpectrumRow};
 use crate::diagnose::{Diagnosis, Located};
+use crate::observation::Dimension;
 
 fn moments(diagnosis: &Diagnosis) -> [(&'static str, &Located); 2] {
     [("after", &diagnosis.located_after), ("before", &diagnosis.located_before)]
@@ -23,6 +24,26 @@ impl Shares {
         });
         let mut rows: Vec<ShareRow> = rows.collect();
         rows.sort_by(|a, b| (&a.moment, &a.by, &a.name).cmp(&(&b.moment, &b.by, &b.name)));
+        Self(rows)
+    }
+}
+
+impl Cells {
+    /// A row for each place and kind of variable, before and after.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let lengths = diagnosis.dimension == Dimension::Length;
+        let rows = moments(diagnosis).into_iter().flat_map(|(moment, located)| {
+            located.cells.iter().map(move |cell| CellRow {
+                moment: moment.into(),
+                place: cell.place.to_string(),
+                follows: cell.follows.into(),
+                explains_mm: lengths.then_some(1e3 * cell.explains),
+                delta_bic: cell.delta_bic,
+                effect: cell.effect.into(),
+            })
+        });
+        let mut rows: Vec<CellRow> = rows.collect();
+        rows.sort_by(|a, b| (&a.moment, &a.place, &a.follows).cmp(&(&b.moment, &b.place, &b.follows)));
         Self(rows)
     }
 }

@@ -72,6 +72,7 @@ macro_rules! tables {
 }
 
 mod body_consistency;
+mod cause_grid;
 mod contacts;
 mod convention;
 mod corrections;
@@ -105,6 +106,7 @@ mod verdict;
 mod verdict_sentences;
 
 pub use crate::store::frame::TextCells;
+pub use cause_grid::{CauseGrid, CauseGridCell};
 pub use findings::is_separable_by_poses;
 pub use forms::formula_in_words;
 pub use motion::ArmMotion;
@@ -119,6 +121,7 @@ pub use verdict_sentences::VerdictTopic;
 tables! {
     acceptance => Acceptance of AcceptanceRow,
     body_consistency => BodyConsistencies of BodyConsistencyRow,
+    cells => Cells of CellRow,
     changes => Changes of ChangeRow,
     contacts => Contacts of ContactRow,
     convention => JointConventions of JointConventionRow,

@@ -31,8 +31,8 @@ pub use round::BASE;
 pub use separate::{DiagnosedModel, discrimination_problem};
 pub use setup::wrong_setup;
 pub use types::{
-    ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question,
-    RivalCause, SETUP, SpectrumLine, VerdictKind,
+    ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedCell, ExplainedShare, Finding, JointRepeatability, Located,
+    Probabilities, Question, RivalCause, SETUP, SpectrumLine, VerdictKind,
 };
 pub use verdict::other_means;
 

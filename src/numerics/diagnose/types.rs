@@ -155,6 +155,21 @@ pub struct ExplainedShare {
     pub effect: &'static str,
 }
 
+/// A cell of the table of causes: a place, and the kind of variable that something there follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExplainedCell {
+    /// Where it acts.
+    pub place: Place,
+    /// E.g. `own angle`, `load`, `time`; `constant` of what follows nothing.
+    pub follows: &'static str,
+    /// Rms motion at the tool of what the likeliest cause there explains of the residual: m, or rad where no row measured a length.
+    pub explains: f64,
+    /// Twice ln of its posterior odds: positive where it is likelier than nothing.
+    pub delta_bic: f64,
+    /// The name of the likeliest cause there.
+    pub effect: &'static str,
+}
+
 /// What a sine and a cosine of an order explain of the residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectrumLine {
@@ -173,6 +188,8 @@ pub struct SpectrumLine {
 pub struct Located {
     /// Places, then variables; largest shares first.
     pub shares: Vec<ExplainedShare>,
+    /// By place and kind of variable.
+    pub cells: Vec<ExplainedCell>,
     /// By joint, motor and order.
     pub spectrum: Vec<SpectrumLine>,
 }

@@ -196,6 +196,11 @@ impl std::ops::Deref for Form {
 }
 
 impl Form {
+    /// The column of the table of causes that it is in, of something at a place: that of its first variable, `constant` without one.
+    pub fn follows(&self, place: Place) -> &'static str {
+        self.variables().first().map_or("constant", |of| of.kind(place))
+    }
+
     /// The name of its cause.
     pub fn name(&self) -> &'static str {
         self.cause().name()

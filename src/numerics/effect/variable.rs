@@ -1,6 +1,6 @@
 //! What a row of a recording offers that an error may depend on.
 
-use super::ArmState;
+use super::{ArmState, Place};
 use crate::robot::{CircumstanceName, Memory, RobotModel};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -128,6 +128,25 @@ pub enum Variable {
 }
 
 impl Variable {
+    /// The column of the table of causes to which it belongs, of something at a place.
+    pub fn kind(self, place: Place) -> &'static str {
+        match self {
+            Self::Angle { joint } | Self::Motor { joint } => match place {
+                Place::Joint(own) | Place::Links(own, _) if own == joint => "own angle",
+                _ => "other angle",
+            },
+            Self::Load { .. } | Self::Push { .. } | Self::Current { .. } | Self::Gravity { .. } | Self::ArmLoad => "load",
+            Self::Payload => "payload",
+            Self::Approach { .. } => "approach",
+            Self::Move { .. } | Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. } | Self::LastMove => "travel",
+            Self::Velocity { .. } | Self::Speed | Self::Work { .. } => "speed",
+            Self::Temperature | Self::Lagging { .. } => "temperature",
+            Self::Time => "time",
+            Self::Azimuth | Self::Elevation | Self::Range | Self::Position { .. } | Self::Sighted { .. } => "position",
+            Self::Circumstance { .. } => "circumstance",
+        }
+    }
+
     /// How many numbers it is.
     pub(super) fn components(self) -> usize {
         if self == (Self::Gravity { axis: None }) { 3 } else { 1 }

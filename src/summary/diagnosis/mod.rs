@@ -7,12 +7,13 @@ use super::robot_of;
 use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::StageReport;
+use crate::report::{DiagnosedTables, diagnosed_page};
 use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
-    FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table, Verdict,
-    VerdictRow, VerdictSentences, VerdictTopic, formula_in_words, is_separable_by_poses,
+    CauseGrid, Cells, FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table,
+    Verdict, VerdictRow, VerdictSentences, VerdictTopic, formula_in_words, is_separable_by_poses,
 };
 use serde_json::{Value, json};
 
@@ -26,6 +27,7 @@ pub struct DiagnosisSummary {
     numbers: FindingNumbers,
     rivals: Rivals,
     shares: Shares,
+    cells: Cells,
     forms: Forms,
     suspects: Suspects,
     /// Its name.
@@ -105,6 +107,7 @@ impl DiagnosisSummary {
             numbers,
             rivals: table(stage, store)?,
             shares: table(stage, store)?,
+            cells: table(stage, store)?,
             forms: table(stage, store)?,
             suspects: table(stage, store)?,
             robot: robot_of(stage, store)?,
@@ -229,6 +232,28 @@ impl DiagnosisSummary {
         self.located(by).iter().map(one).collect()
     }
 
+    /// The diagnosis as one HTML file; `store` as in [`Self::document`].
+    pub fn page(&self, store: &str) -> Result<String> {
+        let v = &self.verdict;
+        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        diagnosed_page(&DiagnosedTables {
+            title: self.robot.as_deref().unwrap_or("diagnosis"),
+            origin: [&self.run, &self.step],
+            verdict: (
+                v.verdict == VerdictKind::Explained.name(),
+                v.statement.clone().unwrap_or_else(|| v.verdict.replace('_', " ")),
+            ),
+            errors: vec![
+                ["before".into(), mm(v.before_mean_mm), mm(v.before_rms_mm), mm(v.before_max_mm)],
+                ["after".into(), mm(v.after_mean_mm), mm(v.after_rms_mm), mm(v.after_max_mm)],
+                ["noise".into(), "-".into(), mm(v.noise_floor_mm), "-".into()],
+            ],
+            cells: &self.cells,
+            findings: &self.findings,
+            next: self.next(store).unwrap_or_default(),
+        })
+    }
+
     /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
     pub fn text(&self, store: &str) -> String {
         let v = &self.verdict;
@@ -256,6 +281,10 @@ impl DiagnosisSummary {
         }
         if !self.shares.0.is_empty() {
             text.push_str("            (of the squared residual, what one cause there could explain at most)\n\n");
+        }
+        let grid = CauseGrid::of(&self.cells, &self.findings).text();
+        if !grid.is_empty() {
+            text.push_str(&format!("{grid}            (rms at the tool of what was found, by what it follows)\n\n"));
         }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));

@@ -8,7 +8,7 @@ use super::scan::{CauseTable, CellScan};
 use super::search::without;
 use super::state::{CellColumns, Component, KnownState};
 use crate::criteria::cells::{BENDS, MISLED, NU, RIVAL};
-use crate::diagnose::types::{ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
+use crate::diagnose::types::{ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine};
 use crate::effect::{Basis, Clock, Form, Place, Variable, names};
 use std::collections::BTreeMap;
 
@@ -187,6 +187,7 @@ impl CauseTable<'_, '_> {
     pub(super) fn locate(&self, state: &KnownState) -> Located {
         let mut best: BTreeMap<(&'static str, String), ExplainedShare> = BTreeMap::new();
         let mut lines: BTreeMap<(usize, bool, u32), f64> = BTreeMap::new();
+        let mut cells: BTreeMap<(Place, &'static str), ExplainedCell> = BTreeMap::new();
         let clock = Clock::of(self.survey.data);
         let across = self.across(state);
         for (k, cell) in self.cells.iter().enumerate() {
@@ -195,15 +196,16 @@ impl CauseTable<'_, '_> {
                 let seen = &block.groups[group];
                 let share = found.fit / state.rows.square.max(f64::MIN_POSITIVE);
                 let parameters = seen.group.shapes[shape].shares.iter().filter(|share| **share > 0.0).count();
-                let entry = |by, name: String| ExplainedShare {
-                    by,
-                    name,
-                    share,
-                    parameters,
-                    delta_bic: 2.0 * (found.log + cell.log_prior),
-                    effect: cell.name,
-                };
+                let delta_bic = 2.0 * (found.log + cell.log_prior);
+                let entry = |by, name: String| ExplainedShare { by, name, share, parameters, delta_bic, effect: cell.name };
                 let form = &seen.group.forms[0];
+                let follows = form.follows(cell.place);
+                let explains = self.frame.size(found.fit) * state.kappa;
+                let new = ExplainedCell { place: cell.place, follows, explains, delta_bic, effect: cell.name };
+                let at = cells.entry((cell.place, follows)).or_insert_with(|| new.clone());
+                if new.delta_bic > at.delta_bic {
+                    *at = new;
+                }
                 let variables: Vec<String> = form.variables().into_iter().map(|of| clock.named(of)).collect();
                 let variable = (!variables.is_empty()).then(|| ("variable", variables.join(" and ")));
                 for (by, name) in [("place", cell.place.to_string())].into_iter().chain(variable) {
@@ -222,7 +224,7 @@ impl CauseTable<'_, '_> {
         let mut shares: Vec<ExplainedShare> = best.into_values().collect();
         shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
         let spectrum = lines.into_iter().map(|((joint, motor, order), share)| SpectrumLine { joint, motor, order, share });
-        Located { shares, spectrum: spectrum.collect() }
+        Located { shares, cells: cells.into_values().collect(), spectrum: spectrum.collect() }
     }
 
     /// Standard errors of forms that geometry may hide.

@@ -256,6 +256,12 @@ impl<'a> SearchRows<'a> {
         Some(out)
     }
 
+    /// Rms motion at the tool of what makes the squared residual smaller by so much.
+    pub fn size(&self, fit: f64) -> f64 {
+        let count = self.variance.len().max(1) as f64;
+        (fit.max(0.0) * self.variance.iter().sum::<f64>() / (count * count)).sqrt()
+    }
+
     fn mean_square(&self, column: &[f64]) -> f64 {
         let of_row = |(i, variance): (usize, &f64)| {
             let lines = self.view.problem.readings_of(i);

@@ -1,0 +1,86 @@
+//! The picture of the table of causes: what was found and what is left, by place and by what it follows.
+
+use super::findings::sentence_case;
+use super::number::significant;
+use super::page::render;
+use crate::effect::names;
+use crate::error::Result;
+use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
+use serde_json::{Value, json};
+
+/// Sizes (mm) from which a cell has the next colour.
+const DECADES: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
+
+/// What the macro `causes` of the page draws; none where nothing was asked.
+pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
+    let grid = CauseGrid::of(cells, findings);
+    let drawn = |cell: &Option<CauseGridCell>, is_found: bool| {
+        let Some(cell) = cell else { return json!({ "class": "", "size": "", "name": "" }) };
+        let Some(mm) = cell.mm.or_else(|| (!cell.effects.is_empty()).then_some(0.0)) else {
+            return json!({ "class": "asked", "size": "\u{b7}", "name": "" });
+        };
+        let step = DECADES.iter().filter(|from| mm >= **from).count();
+        let unnamed = cell.effects.iter().all(|effect| effect == names::UNKNOWN);
+        let name = if is_found {
+            cell.effects.iter().map(|effect| effect.replace('_', " ")).collect::<Vec<_>>().join(", ")
+        } else {
+            String::new()
+        };
+        json!({ "class": format!("size{step}{}", if unnamed && is_found { " open" } else { "" }), "size": length(mm), "name": name })
+    };
+    let rows = grid.rows.iter().map(|row| {
+        let of = |cells: &[Option<CauseGridCell>], is_found| cells.iter().map(|cell| drawn(cell, is_found)).collect::<Vec<_>>();
+        json!({ "place": row.place, "found": of(&row.found, true), "left": of(&row.left, false) })
+    });
+    let rows: Vec<Value> = rows.collect();
+    (!rows.is_empty()).then(|| json!({ "columns": grid.columns, "rows": rows, "others": grid.others }))
+}
+
+/// A size in the unit in which it is short.
+fn length(mm: f64) -> String {
+    match mm {
+        _ if mm >= 1.0 => format!("{} mm", significant(mm, 2)),
+        _ => format!("{} \u{b5}m", significant(1e3 * mm, if mm >= 0.01 { 2 } else { 1 })),
+    }
+}
+
+/// What a page of one diagnosis is made of.
+pub struct DiagnosedTables<'a> {
+    /// Head of the page.
+    pub title: &'a str,
+    /// The run and the stage.
+    pub origin: [&'a str; 2],
+    /// Whether the error comes down to the noise, and the verdict in a sentence.
+    pub verdict: (bool, String),
+    /// Name, mean, rms and largest error, mm.
+    pub errors: Vec<[String; 4]>,
+    /// The table of causes.
+    pub cells: &'a Cells,
+    /// What was found.
+    pub findings: &'a Findings,
+    /// What to measure next, a sentence each.
+    pub next: Vec<String>,
+}
+
+/// A diagnosis as one file that needs no other.
+pub fn diagnosed_page(tables: &DiagnosedTables) -> Result<String> {
+    let findings = tables.findings.0.iter().map(|finding| {
+        let chance = finding.probability.map(|probability| format!(", probability {probability:.2}")).unwrap_or_default();
+        [finding.statement.clone(), format!("{} at {}{chance}", finding.effect, finding.place)]
+    });
+    let page = json!({
+        "title": tables.title,
+        "policy": "",
+        "style": include_str!("report.css"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "run": tables.origin[0],
+        "step_id": tables.origin[1],
+        "kind": if tables.verdict.0 { "better" } else { "open" },
+        "sentence": sentence_case(&tables.verdict.1),
+        "errors": tables.errors,
+        "causes_found": picture(tables.cells, tables.findings),
+        "findings": findings.collect::<Vec<_>>(),
+        "next": tables.next,
+    });
+    render("diagnosed.html", include_str!("diagnosed.html"), &page)
+}
