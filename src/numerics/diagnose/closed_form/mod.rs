@@ -13,7 +13,7 @@ use super::regression::FormRegression;
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::{ClosedForm, Finding};
 use crate::criteria::closed_form::STARTS;
-use crate::effect::{DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, people};
+use crate::effect::{DeclaredCause, DeclaredForm, Form, Motion, ParameterEstimate, Place, Survey, Variable, names, people};
 use front::{Priced, front};
 use grammar::{NamedVariable, declarations};
 use shape_sigma::shape_sigmas;
@@ -43,7 +43,7 @@ impl FormulaSearch<'_, '_> {
         let nameless = |form: &Form| form.cause().is_nameless();
         // What it has elsewhere are details of the model.
         let own: Vec<&Form> = finding.forms.iter().filter(|form| form.place() == finding.place).collect();
-        if own.is_empty() || !own.iter().all(|form| nameless(form)) {
+        if finding.effect != names::UNKNOWN || own.is_empty() || !own.iter().all(|form| nameless(form)) {
             return None;
         }
         let causes = &self.state.causes;

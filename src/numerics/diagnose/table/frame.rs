@@ -11,6 +11,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// How the noise of the rows differs from what they state: weights of rows that are far off, and the shape of the others'.
 #[derive(Clone, Default)]
@@ -26,7 +27,7 @@ pub(super) struct NoiseShape {
 /// UnitColumns of unit rms motion at the tool.
 pub(super) struct UnitColumns {
     /// Residual rows x columns.
-    pub values: DMatrix<f64>,
+    pub values: Arc<DMatrix<f64>>,
     /// Mean squared motion (m2 or rad2) by a unit of each coefficient.
     pub square: Vec<f64>,
 }
@@ -143,7 +144,7 @@ impl<'a> SearchRows<'a> {
         project(self.base.as_ref().subrows(0, rows), &mut values);
         let counts = each.iter().map(|own| own.square.len()).collect();
         let square: Vec<f64> = each.into_iter().flat_map(|own| own.square).collect();
-        (UnitColumns { values: DMatrix::from_vec(rows, square.len(), values), square }, counts)
+        (UnitColumns { values: Arc::new(DMatrix::from_vec(rows, square.len(), values)), square }, counts)
     }
 
     /// The columns of any form; without the rows of currents where it says nothing of these.

@@ -61,12 +61,12 @@ impl CauseTable<'_, '_> {
                     let forms = |free: FreeShape| {
                         let groups = free.groups(self.survey, &values, true);
                         let group = groups.get(found.shape.0)?;
-                        Some((free, self.forms_of(group, found.shape.1)))
+                        Some((free, self.forms_of(group, found.shape.1)?))
                     };
                     free.near(level).into_iter().filter_map(forms).filter(|(_, forms)| !is_there(forms)).collect::<Vec<_>>()
                 };
                 let refined = climb(*free, start, &near, &value, &|_, _| 0.0)?;
-                let forms = self.forms_of(refined.0.groups(self.survey, &values, true).get(found.shape.0)?, found.shape.1);
+                let forms = self.forms_of(refined.0.groups(self.survey, &values, true).get(found.shape.0)?, found.shape.1)?;
                 Some((forms, refined.1, refined.2))
             }
             (Shapes::Listed(_), [form]) if !form.cause().is_nameless() => {
@@ -82,10 +82,10 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// The forms of a shape of a group: those that it gives a share.
-    fn forms_of(&self, group: &ShapeGroup, shape: usize) -> Vec<Form> {
+    /// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.
+    fn forms_of(&self, group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
         let mut at = 0;
-        let shares = &group.shapes[shape].shares;
+        let shares = &group.shapes.get(shape)?.shares;
         let mut out = Vec::new();
         for form in &group.forms {
             let count = form.term().map_or(0, |term| fields(term.motion()) * term.law().count());
@@ -95,7 +95,7 @@ impl CauseTable<'_, '_> {
                 out.push(form.clone());
             }
         }
-        out
+        Some(out)
     }
 }
 

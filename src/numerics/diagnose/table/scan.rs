@@ -2,8 +2,8 @@
 
 use super::cell::{CauseCell, FreeShape, Over, Shapes};
 use super::evidence::log_sum;
-use super::frame::{SearchRows, product, view};
-use super::state::{CellColumns, Component, KnownState, PartProducts};
+use super::frame::{SearchRows, UnitColumns};
+use super::state::{CellColumns, ColumnProducts, Component, KnownState, PartProducts};
 use super::{generated, listed};
 use crate::criteria::cells::{ALIKE, BENDS, COMPONENTS, FAR_BELOW, JOINS, PAIR, PAIRS, UNLIKELY};
 use crate::diagnose::types::Question;
@@ -23,6 +23,7 @@ pub(super) struct CauseTable<'f, 'a> {
     /// Products of the columns of each component with those of every coarse block.
     products: BTreeMap<u64, DMatrix<f64>>,
     pub parts: PartProducts,
+    known: ColumnProducts,
     /// The first of all coarse columns of each cell, and their number.
     pub first: Vec<usize>,
     columns: usize,
@@ -121,6 +122,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             fine,
             products,
             parts: PartProducts::default(),
+            known: ColumnProducts::default(),
             first,
             columns,
             next: 0,
@@ -149,7 +151,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     pub fn know(&mut self, components: &[Component]) {
         for own in components {
             if !self.products.contains_key(&own.id) {
-                let with = |block: &CellColumns| product(view(&own.part), view(&block.columns.values));
+                let with = |block: &CellColumns| own.by_part(&self.known.of(&own.values, &block.columns.values));
                 let all: Vec<DMatrix<f64>> = self.coarse.par_iter().map(with).collect();
                 let values: Vec<f64> = all.iter().flat_map(|products| products.iter().copied()).collect();
                 self.products.insert(own.id, DMatrix::from_vec(own.part.ncols(), self.columns, values));
@@ -248,7 +250,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     /// The same of a block's columns, from the components that the state has.
     pub fn across_block(&self, block: &CellColumns, state: &KnownState, components: &[&Component]) -> DMatrix<f64> {
         let parts: Vec<DMatrix<f64>> =
-            components.iter().map(|own| product(view(&own.part), view(&block.columns.values))).collect();
+            components.iter().map(|own| own.by_part(&self.known.of(&own.values, &block.columns.values))).collect();
         let rows = parts.iter().map(DMatrix::nrows).sum();
         let columns = block.columns.values.ncols();
         let mut values = Vec::with_capacity(rows * columns);
@@ -411,25 +413,14 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         let square = kept.iter().map(|k| block.columns.square[seen.range.start + k]).collect();
         let shares = kept.iter().map(|k| shape.shares[*k]).collect();
         let shape = super::cell::CellShape { shares, ..shape };
-        let group = super::cell::ShapeGroup { forms: forms.clone(), shapes: vec![shape.clone()], ..seen.group.clone() };
-        Component {
-            id: 0,
-            cell,
-            forms,
-            counts,
-            shape,
-            group: Arc::new(group),
-            values: Arc::new(values),
-            square: Arc::new(square),
-            amplitude: found.amplitude,
-            part: Arc::default(),
-        }
+        let group = super::cell::ShapeGroup { forms: forms.clone(), shapes: vec![shape], ..seen.group.clone() };
+        Component::apart(cell, forms, counts, group, UnitColumns { values: Arc::new(values), square }, found.amplitude)
     }
 
     /// A component with other forms, before it has a part in the covariance.
     pub fn with_forms(&self, before: &Component, forms: Vec<Form>) -> Component {
         let (columns, counts) = self.frame.columns(&forms);
-        Component { forms, counts, values: Arc::new(columns.values), square: Arc::new(columns.square), ..before.clone() }
+        Component { forms, counts, values: columns.values, square: Arc::new(columns.square), ..before.clone() }
     }
 
     /// A component of given forms, e.g. of the model before.

@@ -15,7 +15,7 @@ use faer::{Accum, Mat, MatMut, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, RwLock, Weak};
 
 /// A group of shapes with its columns.
 pub(super) struct SeenGroup {
@@ -58,7 +58,7 @@ impl CellColumns {
 impl CellColumns {
     /// The shape of a component alone.
     pub fn of_component(own: &Component, frame: &SearchRows) -> Self {
-        let values = (*own.values).clone();
+        let values = own.values.clone();
         let (gram, gradient) = (product(view(&values), view(&values)), frame.along(&values));
         let range = 0..values.ncols();
         let group = SeenGroup { group: (*own.group).clone(), range, counts: own.counts.clone(), gram, gradient };
@@ -101,6 +101,8 @@ pub(super) struct Component {
     pub amplitude: f64,
     /// UnitColumns whose products with themselves are its part in the covariance: the directions that the rows could show.
     pub part: Arc<DMatrix<f64>>,
+    /// What makes these of its columns.
+    pub mix: Arc<DMatrix<f64>>,
 }
 
 /// Prior variance of a direction, in that of the noise, below which no row shows it.
@@ -120,19 +122,94 @@ impl Component {
 
     /// With its part in the covariance.
     pub fn with_part(self, id: u64) -> Self {
-        let mut scaled = (*self.values).clone();
-        scaled.column_iter_mut().zip(self.roots()).for_each(|(mut column, root)| column *= root);
-        if scaled.ncols() > 2 {
-            let own = product(view(&scaled), view(&scaled)).symmetric_eigen();
+        let roots: Vec<f64> = self.roots().collect();
+        let mut mix = DMatrix::from_diagonal(&DVector::from_column_slice(&roots));
+        if roots.len() > 2 {
+            let mut gram = product(view(&self.values), view(&self.values));
+            for (j, mut column) in gram.column_iter_mut().enumerate() {
+                column.iter_mut().zip(&roots).for_each(|(entry, root)| *entry *= root * roots[j]);
+            }
+            let own = gram.symmetric_eigen();
             let seen: Vec<usize> = (0..own.eigenvalues.len()).filter(|k| own.eigenvalues[*k] > UNSEEN).collect();
             let kept = if seen.is_empty() { vec![own.eigenvalues.imax()] } else { seen };
-            let directions = own.eigenvectors.select_columns(kept.iter());
-            let mut part = DMatrix::zeros(scaled.nrows(), kept.len());
-            let out = MatMut::from_column_major_slice_mut(part.as_mut_slice(), scaled.nrows(), kept.len());
-            matmul(out, Accum::Replace, view(&scaled), view(&directions), 1.0, Par::Seq);
-            scaled = part;
+            mix *= own.eigenvectors.select_columns(kept.iter());
         }
-        Self { id, part: Arc::new(scaled), ..self }
+        let mut part = DMatrix::zeros(self.values.nrows(), mix.ncols());
+        let out = MatMut::from_column_major_slice_mut(part.as_mut_slice(), self.values.nrows(), mix.ncols());
+        matmul(out, Accum::Replace, view(&self.values), view(&mix), 1.0, Par::Seq);
+        Self { id, part: Arc::new(part), mix: Arc::new(mix), ..self }
+    }
+
+    /// One that has no part in the covariance yet.
+    pub fn apart(
+        cell: usize,
+        forms: Vec<Form>,
+        counts: Vec<usize>,
+        group: ShapeGroup,
+        columns: UnitColumns,
+        amplitude: f64,
+    ) -> Self {
+        let shape = group.shapes[0].clone();
+        let UnitColumns { values, square } = columns;
+        Self {
+            id: 0,
+            cell,
+            forms,
+            counts,
+            shape,
+            group: Arc::new(group),
+            values,
+            square: Arc::new(square),
+            amplitude,
+            part: Arc::default(),
+            mix: Arc::default(),
+        }
+    }
+
+    /// Products of its part with other columns, by those of its columns with them.
+    pub fn by_part(&self, of_columns: &DMatrix<f64>) -> DMatrix<f64> {
+        product(view(&self.mix), view(of_columns))
+    }
+}
+
+/// Products of the columns of components with those of cells, each computed once: most states differ in amplitudes alone.
+#[derive(Default)]
+pub(super) struct ColumnProducts(RwLock<ProductCache>);
+
+#[derive(Default)]
+struct ProductCache {
+    known: BTreeMap<(usize, usize), KnownProduct>,
+    /// Numbers in all of them.
+    size: usize,
+}
+
+struct KnownProduct {
+    /// What it is of: as long as it is known, nothing else comes to lie there.
+    _of: [Weak<DMatrix<f64>>; 2],
+    product: Arc<DMatrix<f64>>,
+}
+
+/// Numbers in known products at most: 128 MB.
+const KNOWN: usize = 1 << 24;
+
+impl ColumnProducts {
+    /// The transpose of `a` times `b`.
+    pub fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
+        let key = (Arc::as_ptr(a) as usize, Arc::as_ptr(b) as usize);
+        if let Ok(cache) = self.0.read()
+            && let Some(known) = cache.known.get(&key)
+        {
+            return known.product.clone();
+        }
+        let product = Arc::new(product(view(a), view(b)));
+        if let Ok(mut cache) = self.0.write() {
+            if cache.size > KNOWN {
+                *cache = ProductCache::default();
+            }
+            cache.size += product.len();
+            cache.known.insert(key, KnownProduct { _of: [Arc::downgrade(a), Arc::downgrade(b)], product: product.clone() });
+        }
+        product
     }
 }
 
