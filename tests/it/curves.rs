@@ -21,6 +21,7 @@ fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
         rank,
         effect: effect.into(),
         place: "joint 3".into(),
+        follows: None,
         statement: String::new(),
         f_statistic: None,
         p_value: None,
@@ -111,6 +112,7 @@ fn curves_of(
         finding_numbers: Vec::new(),
         rivals: Vec::new(),
         forms: Vec::new(),
+        cells: Vec::new(),
         suspects: Vec::new(),
     };
     let tables = Desk::default().run(&Report::default(), reads).expect("a report");

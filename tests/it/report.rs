@@ -286,3 +286,23 @@ fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_lim
     assert_eq!(card("explained", None), "unknown");
     assert_eq!(card("unexplained", None), "open");
 }
+
+#[test]
+fn the_table_of_causes_shows_what_was_found_and_what_is_left() {
+    let grid = CauseGrid::of(&tables::cells(), &tables::findings());
+    assert_eq!(grid.columns, ["own angle", "load"], "columns in which something is");
+    assert_eq!(grid.others, ["other angle", "time", "temperature"]);
+    let places: Vec<&str> = grid.rows.iter().map(|row| row.place.as_str()).collect();
+    assert_eq!(
+        places,
+        ["base", "joint 2"],
+        "a coupling belongs to the joint that is moved, a run of links has a row where something was found alone"
+    );
+    let [base, joint] = &grid.rows[..] else { panic!("two rows") };
+    assert!(base.found.iter().chain(&base.left).all(Option::is_none), "the base was asked neither by angle nor by load");
+    let found = joint.found[0].as_ref().expect("asked");
+    assert_eq!((found.mm, &found.effects[..]), (Some(0.28), &["gear_cyclic".to_string()][..]));
+    assert_eq!(joint.left[0].as_ref().expect("asked").mm, None, "nothing is left by the angle");
+    assert_eq!(joint.left[1].as_ref().expect("asked").mm, Some(0.012));
+    assert_eq!(grid.text(), "found        own angle\njoint 2         280 um\n");
+}

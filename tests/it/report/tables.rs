@@ -173,11 +173,31 @@ fn sentences() -> VerdictSentences {
     VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen)])
 }
 
-fn findings() -> Findings {
+/// Joint 2 is asked twice and has a finding by its angle; of its load something is left, of a coupling to it nothing.
+pub fn cells() -> Cells {
+    let row = |moment: &str, place: &str, follows: &str, explains: f64, delta_bic: f64| CellRow {
+        moment: moment.into(),
+        place: place.into(),
+        follows: follows.into(),
+        explains_mm: Some(explains),
+        delta_bic,
+        effect: "unknown".into(),
+    };
+    Cells(vec![
+        row("after", "base", "time", 0.001, -9.0),
+        row("after", "joint 1->2", "other angle", 0.001, -9.0),
+        row("after", "joint 2", "load", 0.012, 4.0),
+        row("after", "joint 2", "own angle", 0.001, -9.0),
+        row("after", "link 1-2", "temperature", 0.001, -9.0),
+    ])
+}
+
+pub fn findings() -> Findings {
     Findings(vec![FindingRow {
         rank: 1,
         effect: "gear_cyclic".into(),
         place: "joint 2".into(),
+        follows: Some("own angle".into()),
         statement: "joint 2 turns unevenly, twice a turn by 25 arcsec <b>".into(),
         f_statistic: Some(812.0),
         p_value: Some(1e-40),
@@ -419,6 +439,7 @@ pub fn tables(name: &str) -> ReportReads {
         finding_numbers: diagnosed(numbers()),
         rivals: diagnosed(rivals()),
         forms: diagnosed(formulas()),
+        cells: diagnosed(cells()),
         suspects: Vec::new(),
     }
 }
