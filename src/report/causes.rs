@@ -3,7 +3,6 @@
 use super::findings::sentence_case;
 use super::number::significant;
 use super::page::render;
-use crate::effect::names;
 use crate::error::Result;
 use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
 use serde_json::{Value, json};
@@ -20,13 +19,12 @@ pub(super) fn picture(cells: &Cells, findings: &Findings) -> Option<Value> {
             return json!({ "class": "asked", "size": "\u{b7}", "name": "" });
         };
         let step = DECADES.iter().filter(|from| mm >= **from).count();
-        let unnamed = cell.effects.iter().all(|effect| effect == names::UNKNOWN);
         let name = if is_found {
             cell.effects.iter().map(|effect| effect.replace('_', " ")).collect::<Vec<_>>().join(", ")
         } else {
             String::new()
         };
-        json!({ "class": format!("size{step}{}", if unnamed && is_found { " open" } else { "" }), "size": length(mm), "name": name })
+        json!({ "class": format!("size{step}{}", if is_found && !cell.is_named { " open" } else { "" }), "size": length(mm), "name": name })
     };
     let rows = grid.rows.iter().map(|row| {
         let of = |cells: &[Option<CauseGridCell>], is_found| cells.iter().map(|cell| drawn(cell, is_found)).collect::<Vec<_>>();

@@ -1,7 +1,7 @@
 //! The table of causes as a person looks at it: places down the chain, kinds of variable across; what was found, and what is left.
 
 use super::{Cells, Findings};
-use crate::effect::Place;
+use crate::effect::{Place, names};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -50,6 +50,8 @@ pub struct CauseGridCell {
     pub mm: Option<f64>,
     /// Effects, by their names.
     pub effects: Vec<String>,
+    /// Whether one of them has a name.
+    pub is_named: bool,
 }
 
 impl CauseGrid {
@@ -60,6 +62,7 @@ impl CauseGrid {
             let Some(follows) = &finding.follows else { continue };
             let cell = found.entry((row_of(&finding.place), follows.clone())).or_default();
             cell.mm = [cell.mm, finding.effect_rms_mm].into_iter().flatten().reduce(f64::max);
+            cell.is_named |= finding.effect != names::UNKNOWN;
             if !cell.effects.contains(&finding.effect) {
                 cell.effects.push(finding.effect.clone());
             }
@@ -68,7 +71,8 @@ impl CauseGrid {
         for row in cells.0.iter().filter(|row| row.moment == "after") {
             let cell = left.entry((row_of(&row.place), row.follows.clone())).or_default();
             if row.delta_bic > 0.0 && cell.mm.is_none_or(|mm| row.explains_mm.is_some_and(|other| other > mm)) {
-                *cell = CauseGridCell { mm: row.explains_mm, effects: vec![row.effect.clone()] };
+                let is_named = row.effect != names::UNKNOWN;
+                *cell = CauseGridCell { mm: row.explains_mm, effects: vec![row.effect.clone()], is_named };
             }
         }
         let asked: BTreeSet<&(String, String)> = left.keys().chain(found.keys()).collect();

@@ -12,7 +12,7 @@ criteria! {
     /// The same of causes that hardly any arm has.
     RARER: f64 = 0.002, "odds", "judgement: a tenth of the common ones", "";
     /// Prior odds of all cells without a name at a place together.
-    UNNAMED: f64 = 0.01, "odds", "judgement: half of a common cause at each place", "";
+    UNNAMED: f64 = 0.003, "odds", "judgement: a sixth of a common cause at each place", "";
     /// Rows with fewer than which cells without a name are asked only where the others leave more than noise: a free curve bends what geometry
     /// leaves open.
     OPEN: usize = 60, "rows", "count: twice the numbers of an arm's geometry, in rows of three", "";
@@ -39,7 +39,7 @@ criteria! {
     /// By how much ln of the posterior odds has to be larger for another cell to take the place of one.
     SWAPS: f64 = 0.1, "ln of odds", "judgement: no exchange to and fro", "";
     /// ln of the evidence by which a shape with further numbers must be better than a plain one.
-    BENDS: f64 = 6.0, "ln of evidence", "measured: a load that is off by some percent bends a straight spring by up to 6", "";
+    BENDS: f64 = 6.0, "ln of evidence", "judgement: a load that is off by some percent bends a straight spring by up to that", "";
     /// That the evidence misleads: true shapes, places and noise differ a little from every cell's.
     MISLED: f64 = 0.03, "probability", "judgement: until it is measured on concealed recordings", "";
     /// Share of the probability of a name that another cause has which does the same in whatever data.

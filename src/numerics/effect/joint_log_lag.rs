@@ -59,9 +59,9 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
     }
     let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)].map(|(each, by)| (each, by, None));
     let turning: Vec<usize> = survey.revolute().filter(|joint| survey.travel(*joint) > 0.0).collect();
-    let all = laws.into_iter().map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len() + 1));
-    let tried = (laws.len() + 1) * turning.len();
-    let one = turning.iter().map(|joint| Hypothesis::new(Lag { each: false, by: Behind::Move, only: Some(*joint) }, tried));
+    let all = laws.into_iter().map(|(each, by, only)| Hypothesis::new(Lag { each, by, only }, laws.len()));
+    let one = |joint: &usize| Hypothesis::new(Lag { each: false, by: Behind::Move, only: Some(*joint) }, turning.len());
+    let one = turning.iter().map(one);
     all.chain(one).collect()
 }
 

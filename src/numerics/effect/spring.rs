@@ -2,7 +2,7 @@
 //! compliance (without one it moves nothing).
 //!
 //! Its torque is of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest,
-//! or is slack.
+//! or is slack; of further orders where it is a strut on a short crank, or its pressure rises.
 
 use super::form::placed;
 use super::unknown::described;
@@ -26,7 +26,7 @@ pub(super) const MEASURE: Measure = Measure {
 pub(super) static BALANCER: Cause = Cause {
     name: names::COUNTERBALANCE,
     place: "joint 2 or 3",
-    formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
+    formula: "t = a sin q + b cos q, and of 2 q to 4 q, on top of gravity",
     size: "10 to 60 % of the gravity torque",
     confounded: "gear_cyclic of order 1, link_mass",
     needs: "link masses and motor currents",
@@ -86,16 +86,15 @@ fn first() -> u32 {
     1
 }
 
-/// Orders of a spring that has a length at rest.
-const ORDERS: u32 = 2;
+/// The highest order of a spring without a length at rest, of one that has it, and of a strut.
+const ORDERS: [u32; 3] = [1, 2, 4];
 
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
     pub fn propose(cause: &'static Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
-        let springs =
-            joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(*UNCOMMON)).collect()
+        let springs = joints.flat_map(|joint| ORDERS.map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
+        springs.map(|spring| Hypothesis::new(spring, ORDERS.len()).penalised(*UNCOMMON)).collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.
@@ -119,8 +118,9 @@ impl Placed for Spring {
     placed! { self: Place::Joint(self.shape.joint), self.cause, [Variable::Angle { joint: self.shape.joint }], self.shape }
 
     fn numbers(&self, _robot: &RobotModel) -> Vec<NumberSpec> {
-        let names = ["sin", "cos", "sin2", "cos2"].into_iter().take(2 * self.shape.orders as usize);
-        names.map(|name| (name.into(), Unit::NewtonMetre, 1e5)).collect()
+        let order = |order: u32| if order == 1 { String::new() } else { order.to_string() };
+        let names = (1..=self.shape.orders).flat_map(|k| ["sin", "cos"].map(|name| format!("{name}{}", order(k))));
+        names.map(|name| (name, Unit::NewtonMetre, 1e5)).collect()
     }
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {

@@ -103,7 +103,8 @@ impl CauseTable<'_, '_> {
         let strongest = members.iter().copied().max_by(|a, b| log_of(*a, &state, &rest).total_cmp(&log_of(*b, &state, &rest)));
         let main = strongest.unwrap_or(members[0]);
         let cell = components[main].cell;
-        let mut log = log_of(main, &state, &rest);
+        let own = log_of(main, &state, &rest);
+        let mut log = own;
         let mut known = rest.clone();
         known.push(&components[main]);
         for i in members.iter().copied().filter(|i| *i != main) {
@@ -112,7 +113,8 @@ impl CauseTable<'_, '_> {
             known.push(&components[i]);
         }
         let mut scan = self.scan_alike(&components[main], &state, &rest, 8, &[cell]);
-        scan.log_odds[cell] = self.cells[cell].log_prior + log;
+        // Others are asked what the strongest does: further ones of its cell add to any of them.
+        scan.log_odds[cell] = self.cells[cell].log_prior + own;
         let (effect, place) = (told(&components[main], &self.cells[cell]), self.cells[cell].place);
         let (probabilities, rivals) = self.weigh((effect, place), cell, &components[main], &scan);
         let mut bounds = Vec::new();

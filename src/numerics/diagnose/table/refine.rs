@@ -50,7 +50,9 @@ impl CauseTable<'_, '_> {
         let keys: BTreeSet<String> = others.iter().flat_map(|own| &own.forms).map(Form::key).collect();
         let value = |forms: &[Form]| {
             let other = self.with_forms(&best, forms.to_vec());
-            self.of_component(&other, state, others)
+            // With other numbers a variable may have so few values that its curve has fewer columns.
+            let is_alike = other.values.ncols() == best.shape.shares.len();
+            is_alike.then(|| self.of_component(&other, state, others)).flatten()
         };
         let is_there = |forms: &[Form]| forms.iter().any(|form| keys.contains(&form.key()));
         let start = self.of_component(&best, state, others)?;

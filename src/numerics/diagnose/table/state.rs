@@ -189,9 +189,6 @@ struct KnownProduct {
     product: Arc<DMatrix<f64>>,
 }
 
-/// Numbers in known products at most: 128 MB.
-const KNOWN: usize = 1 << 24;
-
 impl ColumnProducts {
     /// The transpose of `a` times `b`.
     pub fn of(&self, a: &Arc<DMatrix<f64>>, b: &Arc<DMatrix<f64>>) -> Arc<DMatrix<f64>> {
@@ -203,7 +200,8 @@ impl ColumnProducts {
         }
         let product = Arc::new(product(view(a), view(b)));
         if let Ok(mut cache) = self.0.write() {
-            if cache.size > KNOWN {
+            // 128 MB.
+            if cache.size > 1 << 24 {
                 *cache = ProductCache::default();
             }
             cache.size += product.len();
