@@ -45,7 +45,7 @@ writes! {
 impl Stage for ReportTorques {
     const NAME: &'static str = "report_torques";
     const SUMMARY: &'static str = "writes one self-contained HTML file: torques before and after, friction, what was found";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = ReportTorquesReads;
     type Writes = ReportTorquesWrites;
 
