@@ -254,3 +254,10 @@ stages:
         }
     }
 }
+
+#[test]
+fn a_run_knows_its_robot() {
+    let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
+    assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
+    assert!(told.contains("--robot: goes with a table of parameters; a run or a pipeline knows its robot"), "{told}");
+}
