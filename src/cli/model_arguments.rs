@@ -98,7 +98,10 @@ impl ModelArguments {
             return IdentifiedModel::of_files(&Files { parameters: self.model.clone(), robot, unchecked: self.unchecked });
         }
         if self.robot.is_some() {
-            return Err(Error::spec("--robot", "goes with a table of parameters; a run or a pipeline knows its robot: leave it out"));
+            return Err(Error::spec(
+                "--robot",
+                "goes with a table of parameters; a run or a pipeline knows its robot: leave it out",
+            ));
         }
         let (store, step) = (self.means.store()?, self.step.as_deref());
         if !matches!(ending.as_str(), "yaml" | "yml") {

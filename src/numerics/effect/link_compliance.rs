@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bending {
-    /// Those across the link, at its middle; in tables of earlier versions.
+    /// Those across the link, at its middle: a joint within it.
     AcrossLink,
     /// Those across the link at each of its places: a beam that does not twist.
     Beam,
@@ -52,7 +52,7 @@ pub(super) static CAUSE: Cause = Cause {
 fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let n = survey.joints();
     let loaded = (0..n).any(|joint| survey.is_loaded(joint));
-    let bendings = [Bending::Beam, Bending::Tube, Bending::AcrossAxis, Bending::TwoDirections];
+    let bendings = [Bending::Beam, Bending::Tube, Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
     let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
     let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
     let odds = |form: &BentLink| if form.link + WRIST >= n { *UNLIKELY } else { *RARE };

@@ -136,8 +136,15 @@ impl Measurements {
 
     /// The last row of the stop before that of a row, and the first row of its own; none at the first stop.
     pub fn preceding_move(&self, row: usize) -> Option<[usize; 2]> {
-        let first = self.stop(row);
-        Some([self.at_place(self.rank_in_time(first).checked_sub(1)?), first])
+        let mut first = self.stop(row);
+        loop {
+            let before = self.at_place(self.rank_in_time(first).checked_sub(1)?);
+            // Measured again before the arm left.
+            if !self.near_pose(before, first) {
+                return Some([before, first]);
+            }
+            first = self.stop(before);
+        }
     }
 
     /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
