@@ -37,7 +37,9 @@ fn propose(survey: &Survey) -> Vec<Hypothesis> {
     let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
     let links = (1..survey.joints()).filter(carried).filter(known);
     let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-    forms.map(|form| Hypothesis::new(form, 2).penalised(*RARE)).collect()
+    // What is off by more than half of a link is no error of its mass.
+    let half = |form: &WrongLinkMass| 0.5 * body(&form.link).mass.unwrap_or(f64::INFINITY);
+    forms.map(|form| (half(&form), form)).map(|(half, form)| Hypothesis::new(form, 2).penalised(*RARE).within(half)).collect()
 }
 
 impl Placed for WrongLinkMass {
