@@ -34,7 +34,7 @@
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, robot, table, yaml |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
