@@ -1,19 +1,9 @@
 //! Files that are known and not read, by how they begin, and what to do with each.
 
 /// How programs begin, and what they are.
-const PROGRAMS: [(&str, &str); 7] = [
-    (
-        "/PROG",
-        "is a FANUC program (a listing of TP): its positions are not read; write them as text, a row for each with its name and J1 to J6 in deg. \
-         Programs of KUKA (.src, .dat) and ABB (.mod, .prg) are read",
-    ),
-    ("MODULE", RAPID),
-    ("%%%", RAPID),
-    ("&ACCESS", KRL),
-    ("&REL", KRL),
-    ("DEFDAT", KRL),
-    ("DEF", KRL),
-];
+const PROGRAMS: [(&str, &str); 7] =
+    [("/PROG", FANUC), ("MODULE", RAPID), ("%%%", RAPID), ("&ACCESS", KRL), ("&REL", KRL), ("DEFDAT", KRL), ("DEF", KRL)];
+const FANUC: &str = "is a FANUC program (a listing of TP): name it .ls, and its joint positions are read";
 const RAPID: &str = "is an ABB program in RAPID: name it .mod or .prg, and its joint positions are read";
 const KRL: &str = "is a KUKA program in KRL: name it .src or .dat, and its joint positions are read";
 
