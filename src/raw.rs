@@ -5,6 +5,7 @@
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+mod arrays;
 mod bag;
 mod columns;
 mod delimited;

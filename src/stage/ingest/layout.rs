@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
     /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
-    /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather uncompressed or by zstd), for which only
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather and streams of Arrow, uncompressed or by zstd; arrays of NumPy, .npz), for which only
     /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; or a recording of ROS 2 (.mcap, .db3,
     /// or the folder of its parts).
     pub file: RawFile,
