@@ -13,7 +13,7 @@
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
 //! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
-//! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather) as records of cells, numbers in cells | - |
+//! | [`raw`] | the files of others: regular ones alone, decoded without a panic; tables of any kind (text, workbook, Parquet, Feather, arrays, bags of ROS 2) as records of cells, numbers in cells | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`criteria`] | numbers by which something is decided: meaning, unit, source | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
@@ -34,7 +34,7 @@
 //! | [`stage`] | one file per step of a pipeline | compensate, program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, robot, table, yaml |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, criteria, dynamics, effect, estimate, identified, raw, robot, spatial, table, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`excitation`] | which motion to record for torques, for a robot file | identified, numerics, stage |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |

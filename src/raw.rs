@@ -1,23 +1,28 @@
 //! Files that others made: opened only where they are regular, and decoded so that a decoder that gives up is a fault of the file.
 //!
-//! Bytes become text (`text`), text (`delimited`), sheets (`workbook`) and columns (`columns`) become the same records (`record`), and cells numbers
-//! (`number`): all that reads tables of others reads them here.
+//! Bytes become text (`text`), text (`delimited`), sheets (`workbook`), columns (`columns`) and topics of recordings (`bag`) become the same
+//! records (`record`), and cells numbers (`number`): all that reads tables of others reads them here.
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+mod arrays;
+mod bag;
 mod columns;
 mod delimited;
 mod not_read;
 mod number;
 mod record;
+mod source;
 mod text;
 mod workbook;
 
+pub use bag::{BagContent, BagRows, BagTopic, bag_content, is_bag};
 pub use columns::{ColumnRows, has_columns};
 pub use delimited::{Delimiter, TextLayout, TextRows, fields, unquoted_text};
 pub use not_read::not_read;
 pub use number::{DecimalMark, NumberFault, number, number_of_any_mark};
-pub use record::{Record, RecordReader, failed};
+pub use record::{Record, RecordFault, RecordReader, failed};
+pub use source::{Source, source};
 pub use text::{decoded_text, is_utf16, shown, without_utf16};
 pub use workbook::{Workbook, is_workbook};
 

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// known of each target is appended. A target that is not reached gets no joints: their cells are empty (null in Parquet), `remark` says why,
 /// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
-/// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
+/// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS), FANUC (.ls), Universal Robots (.script) and ABB
 /// RAPID (.mod: jointtarget, robtarget). A Cartesian target is reached in the posture that it states, in the controller's counting: S and T of
 /// KRL, confdata of RAPID with cfx; of what that leaves open, and where nothing is stated, the posture nearest to the target before (or
 /// --start) is taken. One that cannot be reached in its posture is refused; where a correction takes a joint over a border, S, T and confdata

@@ -64,7 +64,7 @@ pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Re
         None => emit(&text)?,
     }
     if !arguments.model.quiet {
-        let said: String = export.remarks_in(arguments.format.0.carries).iter().map(|line| format!("{line}\n")).collect();
+        let said: String = export.remarks_in(arguments.format.0).iter().map(|line| format!("{line}\n")).collect();
         let _ = std::io::stderr().write_all(said.as_bytes());
     }
     Ok(())

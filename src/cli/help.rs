@@ -4,7 +4,7 @@ use clap::Command;
 
 /// What one is about to do, and the verbs for it.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Calibrate a robot", &["init", "check", "run", "diagnose", "compensate", "verify-robot", "export"]),
+    ("Calibrate a robot", &["init", "check", "run", "diagnose", "compensate", "verify-robot", "export", "check-export"]),
     ("Look at what was computed", &["show", "log", "diff", "explain", "query", "lineage", "schema"]),
     ("Plan a measurement", &["poses", "excite"]),
     ("Many robots", &["fleet"]),

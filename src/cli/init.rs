@@ -19,7 +19,7 @@ pub(super) struct InitArguments {
     /// The folder for robot.yaml and pipeline.yaml
     #[arg(value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Recordings, delimited text, workbooks (.xlsx) or columns (Parquet, Feather): one file, the controller's and the tracker's, a tracker's for each of several reflectors, or torques of an arm that moves
+    /// Recordings, delimited text, workbooks (.xlsx), columns (Parquet, Feather) or bags of ROS 2 (.mcap, .db3): one file, the controller's and the tracker's, a tracker's for each of several reflectors, or torques of an arm that moves
     #[arg(long, short, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
     /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace

@@ -1,6 +1,7 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
 mod check;
+mod check_export;
 mod companions;
 mod compensate;
 mod diagnose;
@@ -59,6 +60,7 @@ enum Verb {
     Compensate(Box<compensate::CompensateArguments>),
     VerifyRobot(verify_robot::VerifyRobotArguments),
     Export(export::ExportArguments),
+    CheckExport(Box<check_export::CheckExportArguments>),
     Show(show::ShowArguments),
     Log(log::LogArguments),
     Diff(diff::DiffArguments),
@@ -84,7 +86,9 @@ const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a differenc
 
 /// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
 pub fn command() -> clap::Command {
-    help::grouped(Arguments::command())
+    // What other verbs work with is there what a file is held against.
+    let against = |verb: clap::Command| verb.mut_arg("model", |model| model.long("against"));
+    help::grouped(Arguments::command().mut_subcommand("check-export", against))
 }
 
 /// Runs a command line, prints what comes of it and gives the exit code.
@@ -119,6 +123,7 @@ fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
         Verb::Run(verb) => return run::main(&verb, arguments),
+        Verb::CheckExport(verb) => return check_export::main(&verb, arguments),
         Verb::Check(verb) => check::main(&verb, arguments),
         Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),

@@ -17,7 +17,7 @@ pub(super) const CONTROLLER: Format = Format {
 };
 
 fn text(export: &Export) -> Result<String> {
-    let mut text: String = export.remarks().iter().map(|line| format!("# {line}\n")).collect();
+    let mut text: String = export.remarks_in(&CONTROLLER).iter().map(|line| format!("# {line}\n")).collect();
     text.push_str(
         "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
     );

@@ -30,6 +30,7 @@ pub(super) const MDH: Format =
 
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
+    let format = if modified { &MDH } else { &DH };
     if !export.insisted {
         refuse_far(&DhTable::of(&RobotModel::new(export.corrected.clone())), &export.identified.origin)?;
     }
@@ -40,7 +41,7 @@ fn text(export: &Export, modified: bool) -> Result<String> {
     let apart =
         (0..poses.rows()).map(|row| (now.forward(poses.q(row)).translation - then.forward(poses.q(row)).translation).norm());
     let most = apart.fold(0.0, f64::max) * 1e3;
-    let mut out: String = export.remarks().iter().map(|line| format!("# {line}\n")).collect();
+    let mut out: String = export.remarks_in(format).iter().map(|line| format!("# {line}\n")).collect();
     out.push_str(&format!("# conversion to this table: {most:.1e} mm at most over {} poses\n", poses.rows()));
     out.push_str("# masses, payload and couplings are not part of it: they stand in the original robot file\n");
     Ok(out + &body)

@@ -21,8 +21,9 @@ fn text(export: &Export) -> Result<String> {
         let message = "no torques were identified: put `- uses: diagnose_torques` after `ingest_torques`";
         return Err(Error::spec("--format dynamics", message));
     };
-    let document = document(export, torques);
-    serde_json::to_string_pretty(&document?).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+    let mut document = document(export, torques)?;
+    document["mark"] = json!(export.mark(DYNAMICS.name).to_string());
+    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
 }
 
 /// The model of torques as one document.

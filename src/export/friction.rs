@@ -1,6 +1,6 @@
 //! What formats hold of the identified torques: friction, rotor and drive of each joint. What they do not hold is listed.
 
-use super::{CarriedTorques, Export};
+use super::{CarriedTorques, Export, Format};
 use crate::criteria::torque::NAMED;
 use crate::dynamics::{COULOMB, FittedNumber, JointRange, TorqueTerm};
 use crate::effect::Place;
@@ -11,6 +11,7 @@ pub(super) const DAMPING: &str = "viscous_friction";
 pub(super) const FRICTION: &str = COULOMB;
 pub(super) const ARMATURE: &str = "rotor_inertia";
 pub(super) const DRIVE: &str = "torque_constant";
+pub(super) const SPRINGS: [&str; 2] = ["cable_stiffness", "spring_balance"];
 
 /// The number of viscous or Coulomb friction that is of the line of both, where one of them grows with another power of speed.
 pub(super) fn of_line(torques: &IdentifiedTorques, term: &TorqueTerm) -> Option<FittedNumber> {
@@ -70,6 +71,14 @@ pub(super) fn positive(torques: &IdentifiedTorques, effect: &str, joint: usize) 
     coefficient(torques, effect, joint).filter(|value| *value > 0.0)
 }
 
+/// The stiffness of a spring at a joint (from 0), Nm/rad, and the angle at which it rests, rad; none of one that is no straight line.
+pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 2]> {
+    let at = |term: &&TorqueTerm| SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint);
+    let own = torques.model.terms.iter().find(at).filter(|term| stands_alone(torques, term))?;
+    let [stiffness, at_zero] = own.coefficients[..] else { return None };
+    (stiffness > 0.0).then(|| [stiffness, -at_zero / stiffness])
+}
+
 /// Nm at the joint per ampere as identified: the declared one where the drives' numbers are right, none where it is not declared.
 pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
     let declared = torques.per_ampere.as_ref()?.get(joint)?;
@@ -79,10 +88,11 @@ pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
 
 impl Export {
     /// What the reader of a format must know, a sentence a line: of torques, each cause that it leaves out, with its size.
-    pub fn remarks_in(&self, carried: CarriedTorques) -> Vec<String> {
-        let mut lines = self.remarks();
+    pub fn remarks_in(&self, format: &Format) -> Vec<String> {
+        let mut lines = vec![self.mark(format.name).to_string()];
+        lines.extend(self.remarks());
         let Some(torques) = &self.identified.torques else { return lines };
-        let attributes = match carried {
+        let attributes = match format.carries {
             CarriedTorques::All => return lines,
             CarriedTorques::Nothing => {
                 lines.push("not carried: the identified torques (formats urdf, mjcf, json, dynamics)".into());
@@ -92,7 +102,9 @@ impl Export {
         };
         let holds = |term: &&TorqueTerm| {
             let named = matches!(term.place, Place::Joint(_)) && attributes.contains(&term.effect.as_str());
+            let is_whole = !SPRINGS.contains(&term.effect.as_str()) || term.coefficients.len() == 2;
             named
+                && is_whole
                 && stands_alone(torques, term)
                 && (term.effect == DRIVE || of_line(torques, term).is_some() || term.coefficients[0] >= 0.0)
         };

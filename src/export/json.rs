@@ -34,6 +34,7 @@ fn text(export: &Export) -> Result<String> {
     let base = identified.model.base();
     let mut document = json!({
         "calib_model": 1,
+        "mark": export.mark(JSON.name).to_string(),
         "name": corrected.name,
         "origin": identified.origin,
         "conventions": "SI; screws at the zero pose in the base frame: T(q) = exp(S1 q1) .. exp(Sn qn) tool",

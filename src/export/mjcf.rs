@@ -1,7 +1,7 @@
 //! MJCF, MuJoCo's own format: every body's frame parallel to the base at the zero pose and on its joint's axis, so that no angle is
 //! converted and a joint at 0 is the robot at 0. The measured point is a site.
 
-use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, gear, positive};
+use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, SPRINGS, gear, positive, spring};
 use super::xml::{self, Xml, empty, numbers, offset};
 use super::{CarriedTorques, Export, Format};
 use crate::description::JointKind;
@@ -15,13 +15,13 @@ const LEAST: [(&str, &str); 2] = [("boundmass", "0.001"), ("boundinertia", "1e-6
 pub(super) const MJCF: Format = Format {
     name: "mjcf",
     help: "MuJoCo model: bodies and joints at the corrected axes, the tool as a site",
-    carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE]),
+    carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, DRIVE, SPRINGS[0], SPRINGS[1]]),
     text,
 };
 
 fn text(export: &Export) -> Result<String> {
     let robot = &export.corrected;
-    let mut remarks = export.remarks_in(MJCF.carries);
+    let mut remarks = export.remarks_in(&MJCF);
     if !robot.couplings.is_empty() {
         remarks.push("couplings of joints are not part of it: they stand in the original robot file".into());
     }
@@ -86,8 +86,10 @@ fn hinge(xml: &mut Xml, export: &Export, index: usize) -> io::Result<()> {
     let torques = export.identified.torques.as_ref();
     let dynamics = [("damping", DAMPING), ("frictionloss", FRICTION), ("armature", ARMATURE)];
     let dynamics = dynamics.map(|(name, effect)| (name, torques.and_then(|torques| positive(torques, effect, index))));
+    let spring = torques.and_then(|torques| spring(torques, index));
+    let springs = [("stiffness", spring.map(|[stiffness, _]| stiffness)), ("springref", spring.map(|[_, rest]| rest))];
     let dynamics: Vec<(&str, String)> =
-        dynamics.into_iter().filter_map(|(name, value)| Some((name, numbers([value?])))).collect();
+        dynamics.into_iter().chain(springs).filter_map(|(name, value)| Some((name, numbers([value?])))).collect();
     attributes.extend(dynamics.iter().map(|(name, value)| (*name, value.as_str())));
     empty(xml, "joint", &attributes)
 }

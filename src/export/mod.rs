@@ -5,13 +5,19 @@ mod controller;
 mod deviation;
 mod dh;
 mod dynamics;
+mod frames;
 mod friction;
 mod json;
+mod mark;
 mod mjcf;
 mod model;
+mod sdf;
+mod ur_kinematics;
 mod urdf;
+mod xacro;
 mod xml;
 
+pub use mark::{Belonging, ExportMark};
 pub use model::Export;
 
 use crate::error::Result;
@@ -40,4 +46,15 @@ pub enum CarriedTorques {
 }
 
 /// All formats, in the order of the help.
-pub const FORMATS: &[Format] = &[urdf::URDF, dh::DH, dh::MDH, json::JSON, mjcf::MJCF, controller::CONTROLLER, dynamics::DYNAMICS];
+pub const FORMATS: &[Format] = &[
+    urdf::URDF,
+    xacro::XACRO,
+    ur_kinematics::UR_KINEMATICS,
+    dh::DH,
+    dh::MDH,
+    json::JSON,
+    mjcf::MJCF,
+    sdf::SDF,
+    controller::CONTROLLER,
+    dynamics::DYNAMICS,
+];

@@ -15,8 +15,16 @@ pub(super) const URDF: Format = Format {
     text,
 };
 
+/// A torque and a speed that no joint has: of a limit URDF demands both.
+const UNKNOWN: &str = "1e9";
+
 fn text(export: &Export) -> Result<String> {
-    let remarks = export.remarks_in(URDF.carries);
+    let mut remarks = export.remarks_in(&URDF);
+    if export.corrected.joints.iter().any(|joint| joint.limits.is_some() || joint.kind == JointKind::Prismatic) {
+        remarks.push(format!(
+            "largest torques and speeds of the joints are not known: {UNKNOWN} stands for none, which URDF does not have"
+        ));
+    }
     xml::document(&remarks, |xml| {
         let name = one_line(&export.corrected.name);
         xml.create_element("robot").with_attribute(("name", name.as_str())).write_inner_content(|xml| robot(xml, export))?;
@@ -88,7 +96,7 @@ fn joint(xml: &mut Xml, export: &Export, index: usize, before: [f64; 3], [parent
         empty(xml, "axis", &[("xyz", &numbers(joint.axis))])?;
         match &limits {
             Some([lower, upper]) => {
-                empty(xml, "limit", &[("lower", lower), ("upper", upper), ("effort", "0"), ("velocity", "0")])
+                empty(xml, "limit", &[("lower", lower), ("upper", upper), ("effort", UNKNOWN), ("velocity", UNKNOWN)])
             }
             None => Ok(()),
         }?;

@@ -57,6 +57,8 @@ pub struct IdentifiedModel {
     pub data: Option<Measurements>,
     /// How the controller counts its joints; none where a table alone was given, which does not say.
     pub convention: Option<JointConvention>,
+    /// The serial number of the robot, as the pipeline's report states it.
+    pub serial: Option<String>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
     pub origin: String,
     /// What the last diagnosis left without a cause, if anything.
@@ -130,7 +132,10 @@ impl IdentifiedModel {
         let sources: Vec<PathBuf> = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
         let alone = step.is_some() || last(Parameters::KIND).is_none();
         let torques = match IdentifiedTorques::of_run(manifest, step, &robot, load)? {
-            Some(torques) if alone => return Ok(Self { sources, ..Self::of_torques(robot, torques)? }),
+            Some(torques) if alone => {
+                let serial = serial(&manifest.pipeline.resolved);
+                return Ok(Self { sources, serial, ..Self::of_torques(robot, torques)? });
+            }
             other => other,
         };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
@@ -165,7 +170,8 @@ impl IdentifiedModel {
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
         let convention = Some(convention);
-        let known = Self { torques, correction, covariance, scatter, data, convention, ..own };
+        let serial = serial(&manifest.pipeline.resolved);
+        let known = Self { serial, torques, correction, covariance, scatter, data, convention, ..own };
         Ok(Self { unexplained, warnings, stage_warnings, refusals, sources, ..known })
     }
 
@@ -231,6 +237,7 @@ impl IdentifiedModel {
             scatter,
             data: None,
             convention: None,
+            serial: None,
             origin,
             unexplained: None,
             warnings: Vec::new(),
@@ -281,6 +288,15 @@ impl IdentifiedModel {
             None => own,
         })
     }
+}
+
+/// What a pipeline's report states as the serial number of the robot.
+fn serial(pipeline: &serde_json::Value) -> Option<String> {
+    let stages = pipeline.get("stages")?.as_array()?.iter();
+    let stated = stages.filter_map(|stage| stage.get("with")?.get("identity")?.as_object());
+    let numbers = stated.flatten().filter(|(key, _)| key.to_lowercase().contains("serial"));
+    let robot = |(key, _): &(&String, &serde_json::Value)| !key.to_lowercase().contains("robot");
+    numbers.min_by_key(robot).and_then(|(_, value)| value.as_str()).map(String::from)
 }
 
 /// The stage whose parameters are taken, and the parameters.

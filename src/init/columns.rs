@@ -54,7 +54,8 @@ impl ExaminedFile {
     /// Nothing is known yet of its columns.
     pub fn unknown(path: &Path, sheet: Sheet) -> Self {
         let own = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
-        let name = sheet.of_book.as_ref().map_or(own.clone(), |sheet| format!("{own} sheet `{sheet}`"));
+        let part = |what: &str, part: &Option<String>| part.as_ref().map(|part| format!("{own} {what} `{part}`"));
+        let name = part("sheet", &sheet.of_book).or_else(|| part("topic", &sheet.topic)).unwrap_or_else(|| own.clone());
         let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
         for (name, unit) in said.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
@@ -91,7 +92,7 @@ impl ExaminedFile {
 
     /// What was found, for the terminal.
     pub fn account(&self) -> String {
-        let mut parts: Vec<String> = self.sheet.trouble.iter().cloned().collect();
+        let mut parts: Vec<String> = self.sheet.notes.iter().chain(&self.sheet.trouble).cloned().collect();
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
         let unused = (0..self.said.len()).filter(|column| !self.is_taken(*column)).collect::<Vec<usize>>();
         if !unused.is_empty() && self.sheet.trouble.is_none() {

@@ -136,6 +136,10 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     if let Some(name) = &sheet.of_book {
         put(&format!("sheet: {}", quoted(name)));
     }
+    if let Some(topic) = &sheet.topic {
+        put(&format!("topic: {}", quoted(topic)));
+    }
+    sheet.notes.iter().for_each(|note| put(&format!("# {}", one_line(note))));
     match sheet.delimiter {
         ',' => {}
         ' ' => put("delimiter: whitespace"),

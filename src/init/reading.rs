@@ -3,7 +3,10 @@
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
-use crate::raw::{self, ColumnRows, Record, RecordReader, Workbook, has_columns, is_utf16, is_workbook, not_read, shown};
+use crate::raw::{
+    self, BagRows, BagTopic, ColumnRows, Record, RecordReader, Workbook, bag_content, failed, has_columns, is_bag, is_utf16,
+    is_workbook, not_read, shown,
+};
 use crate::stage::ingest::ListedTable;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -15,13 +18,16 @@ const LINES: usize = 20_000;
 /// The table of a file; of a workbook its sheets with rows of numbers, where there are so many places for them.
 pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let place = path.display().to_string();
-    let file = raw::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+    let file = raw::source(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
     let failed = |error: std::io::Error| Error::store(&place, format!("cannot be read: {error}"));
     let mut reader = BufReader::new(file);
     let head = reader.fill_buf().map_err(failed)?;
     let one = |sheet: std::result::Result<Sheet, String>| vec![sheet.unwrap_or_else(Sheet::not_understood)];
     if is_workbook(head) {
         return Ok(sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]));
+    }
+    if is_bag(head) {
+        return Ok(topics(path, &place).unwrap_or_else(|error| vec![Sheet::not_understood(error.to_string())]));
     }
     if let Some(language) = listing(&raw::ending(path), head) {
         let table = ListedTable::read(reader, &place, language);
@@ -47,11 +53,40 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
 
 /// The first rows of a file of columns.
 fn columns(source: impl Read, label: &str) -> Result<Sheet> {
-    let (mut rows, mut record, mut found) = (ColumnRows::open(source, label)?, Record::default(), Vec::new());
+    let (names, rows) = first_rows(&mut ColumnRows::open(source, label)?)?;
+    Ok(Sheet::of_columns(names, rows))
+}
+
+fn first_rows(rows: &mut dyn RecordReader) -> Result<(Vec<String>, Vec<Vec<String>>)> {
+    let (mut record, mut found) = (Record::default(), Vec::new());
     while found.len() <= LINES && rows.next(&mut record)? {
-        found.push(record.cells());
+        if record.fault.is_none() {
+            found.push(record.cells());
+        }
     }
-    Ok(Sheet::of_columns(found.remove(0), found))
+    Ok((found.remove(0), found))
+}
+
+/// Of a recording of ROS 2 the topic of joints with most messages, and that of points; with a line on every topic.
+fn topics(path: &Path, place: &str) -> Result<Vec<Sheet>> {
+    let opened = || raw::source(path).map_err(|error| failed(place, &error));
+    let content = bag_content(opened()?, place)?;
+    let most = |wanted: &[&str]| {
+        let fits = |topic: &&BagTopic| topic.messages > 0 && wanted.iter().any(|kind| topic.kind.ends_with(kind));
+        content.topics.iter().filter(fits).max_by_key(|topic| topic.messages)
+    };
+    let chosen = [most(&["/JointState"]), most(&["/PointStamped", "/PoseStamped", "/TransformStamped", "/TFMessage"])];
+    let mut sheets = Vec::new();
+    for topic in chosen.into_iter().flatten() {
+        let (names, rows) = first_rows(&mut BagRows::open(opened()?, place, Some(&topic.name))?)?;
+        sheets.push(Sheet::of_topic(topic, names, rows));
+    }
+    if sheets.is_empty() {
+        sheets.push(Sheet::not_understood("no topic of joints or points".into()));
+    }
+    let lines = content.topics.iter().map(BagTopic::account);
+    sheets[0].notes = lines.chain(content.loss).collect();
+    Ok(sheets)
 }
 
 fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {

@@ -1,6 +1,6 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
-use crate::raw::{Delimiter, fields, unquoted_text};
+use crate::raw::{BagTopic, Delimiter, fields, unquoted_text};
 use crate::stage::ingest::ListedTable;
 use crate::units::{Unit, written};
 
@@ -19,6 +19,10 @@ const NARROWEST: usize = 3;
 pub(super) struct Sheet {
     /// Its name in its workbook, where it is of one.
     pub of_book: Option<String>,
+    /// The topic, where it is of a recording of ROS 2.
+    pub topic: Option<String>,
+    /// What else is to be known of it, in the pipeline and on the terminal.
+    pub notes: Vec<String>,
     pub delimiter: char,
     /// Decimal comma.
     pub comma: bool,
@@ -100,6 +104,19 @@ impl Sheet {
     /// A file of columns.
     pub fn of_columns(names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
         Self { delimiter: ',', header: true, names, rows, ..Self::default() }
+    }
+
+    /// The first messages of a topic; its times are in s.
+    pub fn of_topic(topic: &BagTopic, names: Vec<String>, rows: Vec<Vec<String>>) -> Self {
+        // ROS states everything in SI (REP 103); efforts are torques or whatever the driver has.
+        let unit = |name: &String| match name.rsplit_once('.') {
+            None => ["received", "stamp"].contains(&name.as_str()).then_some("s"),
+            Some((_, "position")) => Some("rad"),
+            Some(("point" | "position" | "translation", _)) => Some("m"),
+            _ => None,
+        };
+        let (units, topic) = (names.iter().map(unit).collect(), Some(topic.name.clone()));
+        Self { topic, units, ..Self::of_columns(names, rows) }
     }
 
     fn delimited(lines: &[String], given: Option<char>) -> Self {

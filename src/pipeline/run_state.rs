@@ -29,7 +29,7 @@ impl HashedFile {
     fn read(path: &Path) -> Result<Self> {
         // First the look: of a file that is written meanwhile it is an old one.
         let look = look(path);
-        let content = raw::open(path).and_then(FileHash::of_reader);
+        let content = raw::source(path).and_then(FileHash::of_reader);
         let content = content.map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
         Ok(Self { content, look })
     }
@@ -38,9 +38,9 @@ impl HashedFile {
 /// Size and time of the last change: where these stay, so did the content.
 type FileLook = (u64, SystemTime);
 
-/// None where the file or its system does not tell.
+/// None where the file or its system does not tell, and of a folder of parts.
 fn look(path: &Path) -> Option<FileLook> {
-    let metadata = std::fs::metadata(path).ok()?;
+    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
     Some((metadata.len(), metadata.modified().ok()?))
 }
 

@@ -77,9 +77,9 @@ pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -
         return Err(Error::Bug(format!("stage {id} opens {asked} without listing it among its files")));
     };
     let shown = known.path.display().to_string();
-    let opened = raw::open(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
-    let size = opened.metadata().ok().map(|metadata| metadata.len());
-    Ok(OpenedInput { label: told(files, known), reader: Box::new(opened), size })
+    let mut reader = raw::source(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
+    let size = reader.bounds().ok().and_then(|bounds| bounds.last().copied());
+    Ok(OpenedInput { label: told(files, known), reader, size })
 }
 
 /// A file in messages: by its name, and where the stage has another file of that name, as the YAML names it.

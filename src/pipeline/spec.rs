@@ -299,7 +299,7 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
 fn unreadable(path: &Path) -> Option<String> {
     let shown = path.display();
     match std::fs::metadata(path) {
-        Ok(found) if found.is_dir() => Some(format!("`{shown}` is a folder; expected a file")),
+        Ok(found) if found.is_dir() => crate::raw::source(path).err().map(|error| format!("`{shown}` {error}")),
         Ok(_) => None,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Some(format!(
             "no such file: `{shown}` (paths are relative to the YAML file; those given by --set to the working directory)"

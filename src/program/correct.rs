@@ -1,7 +1,7 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
 use super::JOINTS;
-use super::{Companion, Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, RobotTool, TargetKind, solve};
+use super::{Companion, Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, RobotTool, solve};
 use crate::compensate::Corrector;
 use crate::compensate::unstated_payload;
 use crate::description::RobotDescription;
@@ -86,7 +86,7 @@ pub fn corrected(
     }
     program.relate_tools(&robot, tool.as_ref()).map_err(|message| Error::spec(source.place, message))?;
     // Joint targets are the same in every frame.
-    let cartesian = program.literals().iter().any(|literal| literal.kind != TargetKind::Joints);
+    let cartesian = program.literals().iter().any(|literal| !literal.kind.is_of_joints());
     if frames == Frames::Refused && cartesian && !program.frames().is_empty() {
         let refused = |note: &Note| Note { message: format!("{}; --assume-frames accepts it", note.message), ..note.clone() };
         let faults = program.frames().iter().map(refused).collect();

@@ -1,8 +1,9 @@
-//! Joint positions that a program declares under names: `CONST jointtarget` of RAPID, `DECL E6AXIS` and `DECL AXIS` of KRL.
+//! Joint positions that a program declares under names: `CONST jointtarget` of RAPID, `DECL E6AXIS` and `DECL AXIS` of KRL, positions in joints of
+//! FANUC's listings, lists of six joints of URScript.
 //!
 //! A robot that is measured at the positions of a program logs no joints: the program holds them. Instructions are not looked at.
 
-use super::{Declared, Language, Literal, Note, krl, placed, rapid};
+use super::{Declared, Language, Literal, Note, TargetKind, fanuc, krl, placed, rapid, urscript};
 
 /// Bytes of a program that lists joints, at most.
 pub const MOST_BYTES: usize = 64 << 20;
@@ -35,6 +36,8 @@ pub fn listing(ending: &str, head: &[u8]) -> Option<Language> {
     let words: &[&str] = match language {
         Language::Krl => &["DEFDAT", "DEF ", "E6AXIS", "E3AXIS", "DECL AXIS", "E6POS", "&ACCESS"],
         Language::Rapid => &["JOINTTARGET", "ROBTARGET", "MODULE"],
+        Language::Fanuc => &["/PROG"],
+        Language::UrScript => &["DEF ", "MOVEJ", "MOVEL"],
     };
     let head = String::from_utf8_lossy(head).to_ascii_uppercase();
     words.iter().any(|word| head.contains(word)).then_some(language)
@@ -49,6 +52,8 @@ pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Not
     let Declared { mut found, names, poses } = match language {
         Language::Krl => krl::listed(bytes),
         Language::Rapid => rapid::listed(bytes),
+        Language::Fanuc => fanuc::listed(bytes),
+        Language::UrScript => urscript::listed(bytes),
     };
     found.faults.append(&mut found.partial);
     found.faults.extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
@@ -63,7 +68,10 @@ pub fn joint_list(bytes: &[u8], language: Language) -> Result<JointList, Vec<Not
     let row = |(literal, Note { line, message: name, .. }): (Literal, Note)| ListedJoints {
         line,
         name,
-        joints: literal.values,
+        joints: match literal.kind {
+            TargetKind::Radians => literal.values.iter().map(|rad| rad.to_degrees()).collect(),
+            _ => literal.values,
+        },
         external: literal.external,
     };
     Ok(JointList { rows: rows.map(row).collect(), poses })

@@ -16,6 +16,17 @@ pub enum TargetKind {
     Frame,
     /// x, y, z (mm), q1..q4 (w, x, y, z).
     Quaternion,
+    /// Six joints, rad.
+    Radians,
+    /// x, y, z (m), rx, ry, rz (rotation vector, rad).
+    RotationVector,
+}
+
+impl TargetKind {
+    /// Whether it is a target of joints.
+    pub fn is_of_joints(self) -> bool {
+        matches!(self, Self::Joints | Self::Radians)
+    }
 }
 
 /// A target of a program.
@@ -61,6 +72,8 @@ impl Literal {
         placed.filter_map(|(k, (value, span))| {
             let fault = match self.kind {
                 TargetKind::Joints => Bound::Angle.fault(value.to_radians()),
+                TargetKind::Radians => Bound::Angle.fault(*value),
+                TargetKind::RotationVector => if k < 3 { Bound::Length } else { Bound::Angle }.fault(*value),
                 _ if k < 3 => Bound::Length.fault(value * 1e-3),
                 TargetKind::Frame => Bound::Angle.fault(value.to_radians()),
                 TargetKind::Quaternion => None,
@@ -74,10 +87,11 @@ impl Literal {
         self.spans.iter().map(|span| span.start).min().unwrap_or_default()
     }
 
-    /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-5 mm is 0.01 um.
+    /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-8 rad 0.03 um, 1e-5 mm is 0.01 um.
     fn decimals(&self, k: usize) -> usize {
         match self.kind {
             TargetKind::Joints => 6,
+            TargetKind::Radians | TargetKind::RotationVector => 8,
             TargetKind::Frame | TargetKind::Quaternion if k < 3 => 5,
             TargetKind::Frame => 6,
             TargetKind::Quaternion => 9,

@@ -1,11 +1,12 @@
 //! Programs of robot controllers, read strictly and rewritten: only the numbers of targets change, every other byte stays.
 //!
-//! KUKA KRL (`krl`) and ABB RAPID (`rapid`). A target is accepted where its literal is understood exactly: every field known, named
+//! KUKA KRL (`krl`), ABB RAPID (`rapid`), FANUC's listings (`fanuc`) and Universal Robots' script (`urscript`). A target is accepted where its literal is understood exactly: every field known, named
 //! once, one number each. What cannot be told to be a target or not refuses the program; nothing is guessed. A program is parsed
 //! whole before anything is solved, so that all its faults come at once. Joint positions that a program declares under names are a table,
 //! too ([`joint_list`]).
 
 mod correct;
+mod fanuc;
 mod flow;
 mod force;
 mod krl;
@@ -18,6 +19,7 @@ mod settle;
 mod stated;
 mod token;
 mod tools;
+mod urscript;
 
 pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
@@ -38,6 +40,10 @@ pub enum Language {
     Krl,
     /// ABB: .mod.
     Rapid,
+    /// FANUC: .ls.
+    Fanuc,
+    /// Universal Robots: .script.
+    UrScript,
 }
 
 impl Language {
@@ -46,6 +52,8 @@ impl Language {
         match ending.to_ascii_lowercase().as_str() {
             "src" | "dat" | "sub" => Some(Self::Krl),
             "mod" | "modx" | "sys" | "sysx" | "prg" => Some(Self::Rapid),
+            "ls" => Some(Self::Fanuc),
+            "script" | "urscript" => Some(Self::UrScript),
             _ => None,
         }
     }
@@ -84,7 +92,7 @@ pub enum Frames {
     Assumed,
 }
 
-/// Joints that both languages have targets for.
+/// Joints that all languages have targets for.
 const JOINTS: usize = 6;
 
 /// Brackets in brackets, at most: targets in arrays of three dimensions have six.
@@ -198,6 +206,8 @@ impl<'p> Program<'p> {
         let mut found = match language {
             Language::Krl => krl::read(bytes, companions),
             Language::Rapid => rapid::read(bytes, companions),
+            Language::Fanuc => fanuc::read(bytes),
+            Language::UrScript => urscript::read(bytes),
         };
         let mut refusal = ProgramRefusal::default();
         match partial {

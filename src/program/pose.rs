@@ -43,40 +43,53 @@ pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector
 const NEAREST: &str = "posture not stated: taken nearest to the target before";
 
 fn is_unstated(literal: &Literal) -> bool {
-    literal.kind != TargetKind::Joints && literal.posture == PostureStatement::Unstated
+    !literal.kind.is_of_joints() && literal.posture == PostureStatement::Unstated
 }
 
 fn target(literal: &Literal, reader: &PostureReader) -> CommandTarget {
     let v = &literal.values;
     let stated = CommandTarget { payload: literal.payload, ..CommandTarget::default() };
-    let posed = |rotation: Matrix3<f64>| {
-        let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * 1e-3);
+    let posed = |rotation: Matrix3<f64>, unit: f64| {
+        let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * unit);
         let pose = pose * literal.tool.unwrap_or_else(Pose::identity).inverse();
         let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
         CommandTarget { point, rotation, posture: reader.posture(literal.posture), ..stated.clone() }
     };
     match literal.kind {
         TargetKind::Joints => CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..stated },
-        TargetKind::Frame => posed(turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians())),
+        TargetKind::Radians => CommandTarget { q: Some(v.clone()), ..stated },
+        TargetKind::Frame => posed(turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians()), 1e-3),
+        TargetKind::RotationVector => posed(Rotation3::new(Vector3::new(v[3], v[4], v[5])).into_inner(), 1.0),
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
-            posed(turn.to_rotation_matrix().into_inner())
+            posed(turn.to_rotation_matrix().into_inner(), 1e-3)
         }
     }
 }
 
 fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q: &[f64]) -> Vec<f64> {
-    if literal.kind == TargetKind::Joints {
-        return q.iter().map(|q| q.to_degrees()).collect();
+    match literal.kind {
+        TargetKind::Joints => return q.iter().map(|q| q.to_degrees()).collect(),
+        TargetKind::Radians => return q.to_vec(),
+        _ => {}
     }
     let mut own = q.to_vec();
     convention.to_robot(&mut own);
     let pose = literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
     let pose = pose * literal.tool.unwrap_or_else(Pose::identity);
-    let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
+    let unit = if literal.kind == TargetKind::RotationVector { 1.0 } else { 1e3 };
+    let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * unit).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];
-    if literal.kind == TargetKind::Frame {
+    if literal.kind == TargetKind::RotationVector {
+        let (vector, given) = (pose.rotation_vector(), Vector3::from_column_slice(given));
+        let angle = vector.norm();
+        // A turn is the same with whole ones added: the nearest to the given is taken, whose axis is that of a turn by nothing.
+        let axis = if angle > 1e-9 { vector / angle } else { given.try_normalize(1e-9).unwrap_or_else(Vector3::x) };
+        let alike = (-1..=1).map(|turn| axis * (angle + std::f64::consts::TAU * f64::from(turn)));
+        let nearest = alike.min_by(|a, b| (a - given).norm().total_cmp(&(b - given).norm()));
+        out.extend(nearest.unwrap_or(vector).iter());
+    } else if literal.kind == TargetKind::Frame {
         let (c, b, a) = rotation.euler_angles();
         // One rotation has several sets of angles: those nearest to the given are taken, so that 180 does not become -180.
         let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();

@@ -2,7 +2,7 @@
 
 use super::flow::JoinedState;
 use super::force::{InForce, Setting};
-use super::{Gathered, Literal, TargetKind};
+use super::{Gathered, Literal};
 use crate::spatial::Pose;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -51,7 +51,7 @@ pub(super) fn settle(found: &mut Gathered, uses: Vec<Vec<InForce>>, words: &Word
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
     for (literal, uses) in found.literals.iter_mut().zip(uses) {
         let at = literal.at();
-        let cartesian = literal.kind != TargetKind::Joints;
+        let cartesian = !literal.kind.is_of_joints();
         let Some(all) = uses.into_iter().reduce(|all, one| all.joined(&one)) else {
             if cartesian {
                 notes.push((

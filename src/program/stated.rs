@@ -6,12 +6,14 @@
 //! Instructions for System Integrators, "Status and Turn"). RAPID: cf1, cf4, cf6 are the quadrants of joints 1, 4, 6; cfx counts by 4 where
 //! the wrist centre is behind axis 1, by 2 where it is behind the lower arm, by 1 where joint 5 is below 0 (ABB, Technical reference manual
 //! RAPID, "confdata"). An arm with a parallelogram, whose joint 3 is counted with joint 2, does not use cfx. KUKA's controllers read S and T of
-//! PTP motions and go on in the posture of before along lines and circles; what was taught there states it all the same.
+//! PTP motions and go on in the posture of before along lines and circles; what was taught there states it all the same. FANUC: CONFIG's F where
+//! joint 5 is above 0 and N where it is below (the wrist points down), U where the elbow is up, and the turns of joints 1, 4 and 6, of
+//! which 0 is from -180 to 180 deg (FANUC, Operator's manual, "Configuration"). URScript names joints near which a pose is reached (`qnear`).
 
 use super::JOINTS;
 use crate::compensate::{ArmSides, StatedPosture, StatedSides};
 use crate::robot::{JointConvention, RobotModel};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt;
 
 /// rad, or a share of a side: nearer to a border than this a number stays as it was written.
@@ -32,6 +34,17 @@ pub enum PostureStatement {
         /// T.
         turn: Option<u32>,
     },
+    /// FANUC: CONFIG of an arm before its base.
+    Config {
+        /// F: joint 5 is above 0; N: below.
+        flip: bool,
+        /// U: the elbow is up.
+        up: bool,
+        /// Whole turns of joints 1, 4 and 6.
+        turns: [i32; 3],
+    },
+    /// URScript: near these joints, 1e-6 rad.
+    Near([i32; 6]),
 }
 
 /// Joints of [`PostureStatement::Configuration`], from 0.
@@ -48,7 +61,8 @@ impl PostureStatement {
     /// In the order in which they stand in a literal's spans: cf1, cf4, cf6, cfx, or S, T.
     pub(super) fn numbers(&self) -> Vec<i32> {
         match self {
-            Self::Unstated => Vec::new(),
+            Self::Unstated | Self::Near(_) => Vec::new(),
+            Self::Config { turns, .. } => turns.to_vec(),
             Self::Configuration(numbers) => numbers.to_vec(),
             Self::StatusTurn { status, turn } => [status, turn].into_iter().flatten().map(|bits| *bits as i32).collect(),
         }
@@ -61,7 +75,8 @@ impl PostureStatement {
             Self::StatusTurn { status: Some(status), .. } => {
                 [Some(status & 1 == 0), Some(status & 2 != 0), Some(status & 4 == 0)]
             }
-            Self::Unstated | Self::StatusTurn { status: None, .. } => [None; 3],
+            Self::Config { flip, up, .. } => [Some(true), Some(up), Some(flip)],
+            Self::Unstated | Self::Near(_) | Self::StatusTurn { status: None, .. } => [None; 3],
         }
     }
 }
@@ -72,7 +87,10 @@ impl PostureReader<'_> {
         let name = match stated {
             PostureStatement::Configuration(_) => "cfx",
             PostureStatement::StatusTurn { status: Some(_), .. } => "S",
-            PostureStatement::Unstated | PostureStatement::StatusTurn { status: None, .. } => return None,
+            PostureStatement::Config { .. } => "CONFIG",
+            PostureStatement::Unstated | PostureStatement::Near(_) | PostureStatement::StatusTurn { status: None, .. } => {
+                return None;
+            }
         };
         if self.sides.is_none() {
             return Some(format!(
@@ -92,6 +110,10 @@ impl PostureReader<'_> {
         let sides = if self.uses_sides(stated) { stated.sides() } else { [None; 3] };
         match stated {
             PostureStatement::Unstated | PostureStatement::StatusTurn { status: None, turn: None } => None,
+            PostureStatement::Near(q) => Some(StatedPosture::near(&q.map(|micro| f64::from(micro) * 1e-6))),
+            PostureStatement::Config { turns: [one, four, six], .. } => {
+                Some(StatedPosture::of_turns(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides))
+            }
             PostureStatement::Configuration([one, four, six, _]) => {
                 Some(StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]).on(sides))
             }
@@ -115,7 +137,16 @@ impl PostureReader<'_> {
         };
         let [shoulder, elbow, wrist] = [0, 1, 2].map(|side| above(side, stated.sides()[side].unwrap_or(true)));
         match stated {
-            PostureStatement::Unstated => stated,
+            PostureStatement::Unstated | PostureStatement::Near(_) => stated,
+            PostureStatement::Config { flip, up, mut turns } => {
+                for (number, joint) in turns.iter_mut().zip(QUADRANTS) {
+                    let beyond = q[joint] / TAU - 0.5;
+                    if (beyond - beyond.round()).abs() > AT_BORDER {
+                        *number = (q[joint] / TAU).round() as i32;
+                    }
+                }
+                PostureStatement::Config { flip, up, turns }
+            }
             PostureStatement::Configuration([.., cfx]) => {
                 let mut numbers = stated.numbers();
                 for (number, joint) in numbers.iter_mut().zip(QUADRANTS) {
@@ -146,6 +177,10 @@ impl fmt::Display for PostureStatement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unstated => f.write_str("no posture"),
+            Self::Near(_) => f.write_str("near the joints that are named"),
+            Self::Config { flip, up, turns: [one, four, six] } => {
+                write!(f, "{} {} T, {one}, {four}, {six}", if *flip { 'F' } else { 'N' }, if *up { 'U' } else { 'D' })
+            }
             Self::Configuration([one, four, six, x]) => write!(f, "[{one},{four},{six},{x}]"),
             Self::StatusTurn { status, turn } => {
                 let named = [("S", status), ("T", turn)].into_iter();

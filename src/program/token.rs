@@ -1,10 +1,10 @@
-//! Tokens of KRL and RAPID: words, numbers, strings and signs, each with its bytes; comments and blanks are none.
+//! Tokens of all languages: words, numbers, strings and signs, each with its bytes; comments and blanks are none.
 //!
 //! A number is one token, everything that clings to it included (`10mm`, `0x1F`, `1.2.3`), so that what is no number by the
 //! language's grammar is seen whole:
 //! KRL: digits [`.` digits] [`E` [sign] digits] (KUKA System Software, Operating and Programming Instructions for System Integrators);
 //! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
-//! binary integers are no coordinates). Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
+//! binary integers are no coordinates), as FANUC's listings and URScript. Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
 
 use super::{Gathered, Language};
 use std::ops::Range;
@@ -14,13 +14,13 @@ pub(super) enum TokenKind {
     Word,
     /// Not yet known to be a number of the language.
     Number,
-    /// `"..."`, or `'...'` of KRL.
+    /// `"..."`, or `'...'` of KRL and FANUC.
     Text,
     /// A sign, of one byte.
     Sign(u8),
     /// `:=`, `==`, `<=`, `>=`, `<>`, by their first byte.
     Pair(u8),
-    /// The end of a line of KRL, whose statements end with their line.
+    /// The end of a line of KRL and URScript, whose statements end with their line.
     LineEnd,
 }
 
@@ -92,7 +92,7 @@ fn is_number(text: &[u8], language: Language) -> bool {
     let mantissa = match (language, fraction) {
         (_, None) => whole > 0,
         (Language::Krl, Some(count)) => whole > 0 && count > 0,
-        (Language::Rapid, Some(count)) => whole + count > 0,
+        (_, Some(count)) => whole + count > 0,
     };
     if matches!(rest.first(), Some(b'e' | b'E')) {
         rest = &rest[1..];
@@ -114,7 +114,14 @@ fn in_word(byte: u8) -> bool {
 pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
     let ProgramText { bytes, language } = source;
     let krl = language == Language::Krl;
-    let comment = if krl { b';' } else { b'!' };
+    let by_line = krl || language == Language::UrScript;
+    let apostrophes = krl || language == Language::Fanuc;
+    let comment = match language {
+        Language::Krl => Some(b';'),
+        Language::Rapid => Some(b'!'),
+        Language::UrScript => Some(b'#'),
+        Language::Fanuc => None,
+    };
     let byte = |at: usize| bytes.get(at).copied();
     let mut out: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
     let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
@@ -125,18 +132,18 @@ pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
         let begins = std::mem::replace(&mut line_begins, here == b'\n');
         at += 1;
         let sort = match here {
-            b'\n' if krl => TokenKind::LineEnd,
+            b'\n' if by_line => TokenKind::LineEnd,
             b' ' | b'\t' | b'\r' | b'\n' => continue,
             // KRL: `&ACCESS`, `&PARAM` and the like at the head of a file, no statements.
             b'&' if krl && begins && out.iter().all(|token| token.sort == TokenKind::LineEnd) => {
                 at = line_end(bytes, at);
                 continue;
             }
-            here if here == comment => {
+            here if Some(here) == comment => {
                 at = line_end(bytes, at);
                 continue;
             }
-            b'"' | b'\'' if here == b'"' || krl => {
+            b'"' | b'\'' if here == b'"' || apostrophes => {
                 let end = line_end(bytes, at);
                 match bytes[at..end].iter().position(|byte| *byte == here) {
                     Some(length) => at += length + 1,

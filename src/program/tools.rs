@@ -5,7 +5,7 @@
 //! says so; axis 6 tells some that are not: a tool keeps its distance from it.
 
 use super::force::ToolInForce;
-use super::{Gathered, Literal, TargetKind};
+use super::{Gathered, Literal};
 use crate::compensate::turns;
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
@@ -73,7 +73,7 @@ pub(super) fn relate(
     known: &[ToolInForce],
 ) -> Result<(), String> {
     let of_the_file = stated.map(|stated| stated.frame(known)).transpose()?;
-    let is_cartesian = |literal: &&Literal| literal.kind != TargetKind::Joints;
+    let is_cartesian = |literal: &&Literal| !literal.kind.is_of_joints();
     let Some(first) = found.literals.iter().find(is_cartesian).map(Literal::at) else { return Ok(()) };
     let mut notes: Vec<(bool, usize, String)> = Vec::new();
     let mut one: Option<ToolInForce> = None;
@@ -81,10 +81,10 @@ pub(super) fn relate(
     let of_joints: Vec<(usize, ToolInForce)> = found
         .literals
         .iter_mut()
-        .filter(|literal| literal.kind == TargetKind::Joints)
+        .filter(|literal| literal.kind.is_of_joints())
         .filter_map(|literal| Some((literal.at(), literal.tool_in_force.take()?)))
         .collect();
-    for literal in found.literals.iter_mut().filter(|literal| literal.kind != TargetKind::Joints) {
+    for literal in found.literals.iter_mut().filter(|literal| !literal.kind.is_of_joints()) {
         let at = literal.at();
         let Some(tool) = literal.tool_in_force.take() else {
             unset.get_or_insert(at);

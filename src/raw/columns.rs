@@ -1,17 +1,18 @@
-//! Files of columns (Parquet, Feather) as the same records that text gives; they are held in memory.
+//! Files of columns (Parquet, Feather, streams of Arrow, arrays of NumPy) as the same records that text gives; they are held in memory.
 //!
 //! Cells become text: a number of 64 bits comes back the same, and there is one way of judging rows. A list of numbers, as learning data
 //! sets hold them, is a column for each: `state[1]`, `state[2]`, and so on.
 
+use super::arrays::{arrays, is_arrays};
 use super::record::{Record, RecordReader, failed};
 use super::{decoded, parquet};
 use crate::error::{Error, Result};
-use arrow::array::{Array, ArrayRef, AsArray, Int64Array, RecordBatch};
+use arrow::array::{Array, ArrayRef, AsArray, Int64Array, RecordBatch, RecordBatchReader};
 use arrow::compute::take;
 use arrow::datatypes::{DataType, Field, FieldRef, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
-use arrow_ipc::reader::FileReader;
+use arrow_ipc::reader::{FileReader, StreamReader};
 use std::fmt::{Display, Write};
 use std::io::{Cursor, Read};
 use std::ops::Range;
@@ -24,12 +25,14 @@ const LONGEST: usize = 256;
 /// How Parquet begins, and Feather of version 1 and of version 2.
 const PARQUET: &[u8] = b"PAR1";
 const FEATHER: [&[u8]; 2] = [b"FEA1", b"ARROW1"];
+/// How a stream of Arrow begins: a message of some length follows.
+const STREAM: &[u8] = b"\xff\xff\xff\xff";
 
 type Batches = Box<dyn Iterator<Item = std::result::Result<RecordBatch, String>> + Send>;
 
 /// Whether a file that begins so is one of columns.
 pub fn has_columns(head: &[u8]) -> bool {
-    [PARQUET, FEATHER[0], FEATHER[1]].iter().any(|mark| head.starts_with(mark))
+    [PARQUET, FEATHER[0], FEATHER[1], STREAM].iter().any(|mark| head.starts_with(mark)) || is_arrays(head)
 }
 
 /// Reads one file from its names to its last row.
@@ -51,6 +54,7 @@ pub struct ColumnRows {
     held: usize,
     next: usize,
     rows: u64,
+    remark: Option<String>,
 }
 
 impl ColumnRows {
@@ -59,6 +63,7 @@ impl ColumnRows {
         let mut content = Vec::new();
         source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
         let size = content.len() as u64;
+        let mut remark = None;
         let (what, opened) = if content.starts_with(PARQUET) {
             let file = parquet(bytes::Bytes::from(content), HELD);
             ("a Parquet file", file.map(|file| (file.schema.clone(), Some(file.rows), Box::new(file) as Batches)))
@@ -66,14 +71,23 @@ impl ColumnRows {
             let message =
                 "is a Feather file of version 1; allowed: version 2, which every writer of today makes, Parquet or text";
             return Err(Error::data(label, message));
+        } else if is_arrays(&content) {
+            let table = arrays(content).map(|(table, left)| {
+                remark = left;
+                (table.schema(), Some(table.num_rows() as u64), Box::new(std::iter::once(Ok(table))) as Batches)
+            });
+            ("an archive of NumPy arrays", table)
+        } else if content.starts_with(STREAM) {
+            ("a stream of Arrow", decoded(|| StreamReader::try_new(Cursor::new(content), None)).and_then(batches_of))
         } else {
-            ("a Feather file", feather(content))
+            ("a Feather file", decoded(|| FileReader::try_new(Cursor::new(content), None)).and_then(batches_of))
         };
         let (schema, all, batches) = opened.map_err(|error| broken(label, what, error))?;
         let (schema, batches) = unfolded(schema, batches);
         let label = label.into();
         let (text, cells) = (String::new(), Vec::new());
-        Ok(Self { label, what, schema, batches, size, all, is_named: false, batch: None, text, cells, held: 0, next: 0, rows: 0 })
+        let (is_named, batch, held, next, rows) = (false, None, 0, 0, 0);
+        Ok(Self { label, what, schema, batches, size, all, is_named, batch, text, cells, held, next, rows, remark })
     }
     /// Makes text of the next rows; false at the end.
     fn refill(&mut self) -> Result<bool> {
@@ -127,6 +141,9 @@ impl RecordReader for ColumnRows {
     fn lines(&self) -> u64 {
         self.rows
     }
+    fn remark(&self) -> Option<String> {
+        self.remark.clone()
+    }
     /// Progress as a part of the file.
     fn bytes(&self) -> u64 {
         let all = self.all.unwrap_or_default().max(1);
@@ -139,9 +156,12 @@ fn broken(label: &str, what: &str, error: impl Display) -> Error {
     Error::data(label, format!("is {what} that cannot be read: {error}"))
 }
 
-/// A Feather file: columns of Arrow as they stand in memory, as pandas, polars and R write them; uncompressed or by zstd.
-fn feather(content: Vec<u8>) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String> {
-    let mut file = decoded(|| FileReader::try_new(Cursor::new(content), None).map_err(|error| error.to_string()))??;
+/// Columns of Arrow as they stand in memory, in a Feather file, as pandas, polars and R write them, or in a stream; uncompressed or by zstd.
+fn batches_of<R>(opened: std::result::Result<R, ArrowError>) -> std::result::Result<(SchemaRef, Option<u64>, Batches), String>
+where
+    R: RecordBatchReader + Send + 'static,
+{
+    let mut file = opened.map_err(|error| error.to_string())?;
     let schema = file.schema();
     // A decoder that gave up is not asked again.
     let mut whole = true;

@@ -4,6 +4,17 @@ use crate::error::{Error, Result};
 use std::io;
 use std::ops::Range;
 
+/// Why a row is not used, whatever its columns are asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordFault {
+    /// It cannot be decoded.
+    Damaged,
+    /// It is of something else: of another robot's joints.
+    Foreign,
+    /// It was recorded at the moment of another one.
+    DoubledStamp,
+}
+
 /// One row; reused from row to row.
 #[derive(Default)]
 pub struct Record {
@@ -11,6 +22,8 @@ pub struct Record {
     pub line: u64,
     /// The bytes as they stand, without the line end.
     pub text: Vec<u8>,
+    /// Why its source says that it is not to be used.
+    pub fault: Option<(RecordFault, String)>,
     /// The fields without quotes, of a row that has some.
     pub(super) unquoted: Vec<u8>,
     pub(super) is_quoted: bool,
@@ -25,6 +38,7 @@ impl Record {
         self.text.clear();
         self.fields.clear();
         self.is_quoted = false;
+        self.fault = None;
     }
     /// Adds a field.
     pub fn push(&mut self, field: &[u8]) {
@@ -75,6 +89,12 @@ pub trait RecordReader: Send {
     /// Skips lines below the header, where the file has lines.
     fn skip(&mut self, _lines: u64) -> Result<()> {
         Ok(())
+    }
+    /// Which columns are asked for, and whether a row may lack them: others may be left blank.
+    fn only(&mut self, _columns: &[(usize, bool)]) {}
+    /// What could not be read of the file, once its last row was.
+    fn loss(&self) -> Option<String> {
+        None
     }
     /// What was left out of the file as a whole, for the person.
     fn remark(&self) -> Option<String> {

@@ -3,6 +3,7 @@
 //! A line is a row of the sheet, and every line but a blank one is as wide as the sheet. What is unpacked is counted beforehand: an
 //! archive may hold a thousand times its size, and the decoder believes what a file says of its own sizes.
 
+use super::arrays::is_arrays;
 use super::decoded;
 use calamine::{Cell, DataRef, ExcelDateTime, Reader, SheetVisible, Xlsx, XlsxError};
 use jiff::SignedDuration;
@@ -30,7 +31,7 @@ const ALLOWED: &str = "allowed: .xlsx, .xlsm, or the sheet saved as CSV";
 
 /// Whether a file that begins so is an archive, as workbooks are, or an older workbook.
 pub fn is_workbook(head: &[u8]) -> bool {
-    head.starts_with(b"PK\x03\x04") || head.starts_with(&[0xd0, 0xcf, 0x11, 0xe0])
+    head.starts_with(b"PK\x03\x04") && !is_arrays(head) || head.starts_with(&[0xd0, 0xcf, 0x11, 0xe0])
 }
 
 /// An opened workbook.

@@ -66,10 +66,10 @@ pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
 use crate::error::{Fault, Result};
+use crate::raw::Source;
 use crate::table::{Frame, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use std::io::Read;
 use std::path::PathBuf;
 
 /// How many upstream tables a port takes.
@@ -271,7 +271,7 @@ pub struct OpenedInput {
     /// As the user named it, for messages and tables.
     pub label: String,
     /// Its bytes.
-    pub reader: Box<dyn Read + Send>,
+    pub reader: Box<dyn Source>,
     /// Bytes, where known.
     pub size: Option<u64>,
 }

@@ -7,6 +7,7 @@ mod counting_said;
 mod doubtful;
 mod framed;
 mod gate;
+mod listings;
 mod maker;
 mod posture;
 mod round_trip;

@@ -48,6 +48,140 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
     }
 }
 
+#[test]
+fn an_sdf_is_the_arm_that_was_identified_and_states_no_limit_that_is_not_known() {
+    let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
+    let text = exported("sdf");
+    let document = roxmltree::Document::parse(&text).expect("XML");
+    let child = |node: roxmltree::Node<'_, '_>, name: &str| -> Vec<f64> {
+        let found = node.descendants().find(|child| child.has_tag_name(name)).unwrap_or_else(|| panic!("no {name}"));
+        found.text().expect("numbers").split(' ').map(|number| number.parse().expect("a number")).collect()
+    };
+    let moving = |node: &roxmltree::Node| node.has_tag_name("joint") && node.attribute("type") != Some("fixed");
+    let joints: Vec<roxmltree::Node> = document.descendants().filter(moving).collect();
+    let mut point = [0.0; 3];
+    for (joint, told) in joints.iter().zip(model["joints"].as_array().expect("joints")) {
+        point = [0, 1, 2].map(|k| point[k] + child(*joint, "pose")[k]);
+        for k in 0..3 {
+            assert!((point[k] - told["point_m"][k].as_f64().expect("a number")).abs() < 1e-12);
+            assert_eq!(child(*joint, "xyz")[k], told["axis"][k].as_f64().expect("a number"));
+        }
+    }
+    let tool = document.descendants().find(|node| node.has_tag_name("frame")).expect("a tool");
+    for k in 0..3 {
+        assert!((point[k] + child(tool, "pose")[k] - model["tool"]["point_m"][k].as_f64().expect("a number")).abs() < 1e-12);
+    }
+    assert_eq!(joints.len(), 6);
+    assert!(!text.contains("effort") && !exported("urdf").contains("effort=\"0\""));
+}
+
+#[test]
+fn a_file_says_whose_it_is_and_whether_it_was_edited() {
+    let here = tempfile::tempdir().expect("a folder");
+    let held = |name: &str, text: &str| {
+        let path = here.path().join(name);
+        std::fs::write(&path, text).expect("a file");
+        let output = calib(cell(), &["check-export", path.to_str().expect("a path"), "--against", "latest"], "");
+        let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        (output.status.code(), said)
+    };
+    for format in ["urdf", "dh", "mdh", "json", "mjcf", "sdf", "controller"] {
+        let text = exported(format);
+        let (code, said) = held(format, &text);
+        assert!(code == Some(0) && said.contains(": is the export of run"), "{format}: {said}");
+        // One digit of one number.
+        let at = text.rfind("0.").expect("a number") + 2;
+        let digit = if text.as_bytes()[at] == b'7' { "8" } else { "7" };
+        let edited = format!("{}{digit}{}", &text[..at], &text[at + 1..]);
+        let (code, said) = held(format, &edited);
+        let line = text[..at].lines().count();
+        assert!(code == Some(1) && said.contains(&format!("line {line} is not as run")), "{format}: {said}");
+    }
+    let text = exported("urdf");
+    let (start, _) = text.split_once(", model ").expect("a mark");
+    let other = format!("{start}, model 0123456789abcdef{}", &text[start.len() + 8 + 16..]);
+    let (code, said) = held("other", &other);
+    assert!(code == Some(1) && said.contains("is of the model 0123456789abcdef; that of run"), "{said}");
+    let (code, said) = held("other", &text.replace("robot serial not stated", "robot serial 77"));
+    assert!(code == Some(1) && said.contains("is of the robot with serial 77; that of run"), "{said}");
+    let (code, said) = held("none", "<robot/>");
+    assert!(code == Some(10) && said.contains("carries no mark of calib"), "{said}");
+}
+
+/// A folder with an arm of the library that was identified.
+fn of_the_library(name: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let robot = calib::robot::LibraryArm::find(name).expect("an arm").text.replace("point: [0, 0, 0]", "point: [40, 30, 120]");
+    std::fs::write(folder.path().join("robot.yaml"), robot).expect("a file");
+    let pipeline = "calib: 1
+name: arm
+seed: 3
+stages:
+  - uses: robot
+    with: {file: robot.yaml}
+  - uses: simulate
+    with:
+      truth: {offset_deg: [0.02, -0.05, 0.04, 0.03, -0.06, 0.0], links: [{link: 2, shift_mm: [0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]}]}
+      poses: {floor_mm: 100, clearance_mm: 200}
+      blocks: [{usage: fit, points: 60}, {usage: validate, points: 20}]
+  - uses: split
+    with: {by: usage}
+  - uses: identify
+    with: {on: [fit]}
+";
+    std::fs::write(folder.path().join("pipeline.yaml"), pipeline).expect("a file");
+    let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder
+}
+
+#[test]
+fn a_drivers_kinematics_are_those_of_the_arm_near_the_frames_of_its_meshes() {
+    let folder = of_the_library("ur10e");
+    let export = |format: &str| {
+        let output = calib(folder.path(), &["export", "latest", "--format", format], "");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("UTF-8")
+    };
+    let model: Value = serde_json::from_str(&export("json")).expect("JSON");
+    let text = export("ur_kinematics");
+    let tool = text.split_once("in tool0 it stands at ").expect("the tool").1;
+    let tool: Vec<f64> = tool.split(' ').take(3).map(|number| number.parse().expect("a number")).collect();
+    let value = |line: &str| line.trim().split_once(": ").and_then(|(_, number)| number.parse::<f64>().ok());
+    let numbers: Vec<f64> = text.lines().filter(|line| line.starts_with("    ")).filter_map(value).collect();
+    // The file that the maker ships for this arm, config/ur10e/default_kinematics.yaml.
+    let half = std::f64::consts::FRAC_PI_2;
+    let shipped = [
+        [0.0, 0.0, 0.1807, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, half, 0.0, 0.0],
+        [-0.6127, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [-0.57155, 0.0, 0.17415, 0.0, 0.0, 0.0],
+        [0.0, -0.11985, 0.0, half, 0.0, 0.0],
+        [0.0, 0.11655, 0.0, -half, 0.0, 0.0],
+    ];
+    assert_eq!(numbers.len(), 36);
+    for (number, shipped) in numbers.iter().zip(shipped.as_flattened()) {
+        assert!((number - shipped).abs() < 3e-3, "{number} {shipped}");
+    }
+    for k in 0..50 {
+        let q: Vec<f64> = (0..6).map(|j| (1.3 * k as f64 + 0.7 * j as f64).sin()).collect();
+        let mut point: [f64; 3] = [tool[0], tool[1], tool[2]];
+        for (origin, angle) in numbers.chunks(6).zip(&q).rev() {
+            let turned_by = |axis, angle| about(axis, angle);
+            let rpy = product(
+                turned_by([0.0, 0.0, 1.0], origin[5]),
+                product(turned_by([0.0, 1.0, 0.0], origin[4]), turned_by([1.0, 0.0, 0.0], origin[3])),
+            );
+            let moved = turned(rpy, turned(about([0.0, 0.0, 1.0], *angle), point));
+            point = [0, 1, 2].map(|axis| moved[axis] + origin[axis]);
+        }
+        let wanted = by_json(&model, &q);
+        assert!((0..3).all(|axis| (point[axis] - wanted[axis]).abs() < 1e-12), "{point:?} {wanted:?}");
+    }
+    let other = calib(cell(), &["export", "latest", "--format", "ur_kinematics"], "");
+    assert!(other.status.code() == Some(10) && String::from_utf8_lossy(&other.stderr).contains("is no arm of Universal Robots"));
+}
+
 type Turn = [[f64; 3]; 3];
 
 /// The product of two rotations, row-major.

@@ -10,6 +10,7 @@
 #[cfg(target_os = "linux")]
 mod alone;
 mod arms;
+mod bags;
 mod beyond;
 mod bucket;
 mod cause_names;

@@ -1,11 +1,14 @@
 //! Programs of controllers: what is read as a target, what is refused, and that nothing but numbers of targets changes.
 
+mod fanuc;
 mod flow;
 mod krl;
+mod mutated;
 mod random;
 mod rapid;
 mod reader;
 mod surroundings;
+mod urscript;
 
 use calib::program::{Language, Literal, Note, Partial, PostureStatement, Program, SolvedLiteral, TargetKind};
 

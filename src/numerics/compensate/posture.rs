@@ -10,6 +10,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// rad or m: a joint at the border of its range, to the decimals of programs, may be solved beyond it by this.
 const BORDER: f64 = 1e-3;
 
+/// rad: joints of one posture are no farther apart, and those of two are.
+const NEAR: f64 = 0.35;
+
 /// Starts that are tried.
 const STARTS: usize = 120;
 
@@ -44,6 +47,20 @@ impl StatedPosture {
             out.ranges[*joint] = Some([f64::from(*quadrant) * FRAC_PI_2, (f64::from(*quadrant) + 1.0) * FRAC_PI_2]);
         }
         out
+    }
+
+    /// A posture of so many joints; `turns` are joints, from 0, with their whole turns: 0 from -180 to 180 deg.
+    pub fn of_turns(joints: usize, turns: &[(usize, i32)]) -> Self {
+        let mut out = Self::free(joints);
+        for (joint, turn) in turns {
+            out.ranges[*joint] = Some([-PI, PI].map(|end| TAU * f64::from(*turn) + end));
+        }
+        out
+    }
+
+    /// A posture near these joints.
+    pub fn near(q: &[f64]) -> Self {
+        Self { ranges: q.iter().map(|q| Some([q - NEAR, q + NEAR])).collect(), ..Self::free(q.len()) }
     }
 
     /// By the sign of every joint: whether it is below 0.

@@ -98,6 +98,21 @@ impl Binding {
         let is_bound = |kind: &KindSlots| brought(kind) || kind.values.iter().chain(&kind.sigma).any(is_filled);
         self.kinds = (0..kinds.len()).filter(|index| is_bound(&kinds[*index])).collect();
     }
+    /// Columns that are read, and whether a row may lack them.
+    pub(super) fn columns(&self) -> Vec<(usize, bool)> {
+        let texts = self.id.iter().chain(self.texts.iter().flatten()).filter_map(|text| match text {
+            TextBinding::Column { column, optional, .. } => Some((*column, !optional)),
+            TextBinding::Value(_) => None,
+        });
+        let cells = self.cells.iter().chain(self.points.iter().flat_map(|(_, cells)| cells));
+        let numbers = cells.flat_map(|cell| {
+            [Some(cell.column), cell.difference.as_ref().map(|other| other.column)]
+                .into_iter()
+                .flatten()
+                .map(|column| (column, !cell.optional))
+        });
+        texts.chain(numbers).chain(self.sequence.map(|column| (column, true))).collect()
+    }
     /// Slots that this file fills.
     pub(super) fn slots(&self) -> Vec<usize> {
         self.cells.iter().map(|cell| cell.index).chain(self.constants.iter().map(|constant| constant.0)).collect()
@@ -318,7 +333,9 @@ impl Binder<'_> {
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
             (Some(list), _) => list.clone(),
             (None, Some(pattern)) => {
-                (1..=count).map(|joint| ColumnRef::Name(pattern.replace("{j}", &joint.to_string()))).collect()
+                let called = |joint: usize| arm.names.get(joint).map_or("", String::as_str);
+                let named = |joint: usize| pattern.replace("{j}", &(joint + 1).to_string()).replace("{name}", called(joint));
+                (0..count).map(|joint| ColumnRef::Name(named(joint))).collect()
             }
             (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
@@ -333,7 +350,7 @@ impl Binder<'_> {
         if !self.are_of_the_robot(joints, name, count) {
             return Ok(());
         }
-        if let Some(pattern) = &joints.column {
+        if let Some(pattern) = joints.column.as_ref().filter(|pattern| pattern.contains("{j}")) {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
                 self.fault(format!("{next}, by the pattern of `{name}`: the robot has {} only", counted(count, "joint")));

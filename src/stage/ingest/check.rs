@@ -222,9 +222,10 @@ fn joint_faults(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLay
         faults,
     );
     match &joints.column {
-        Some(pattern) if !pattern.contains("{j}") => {
-            let message =
-                format!("`{pattern}` has no {{j}} for the joint's number; e.g. `q{{j}}_deg`, or list them in `columns`");
+        Some(pattern) if !["{j}", "{name}"].iter().any(|mark| pattern.contains(mark)) => {
+            let message = format!(
+                "`{pattern}` has neither {{j}} for the joint's number nor {{name}}; e.g. `q{{j}}_deg`, or list them in `columns`"
+            );
             faults.push(Fault::new(format!("{place}.column"), message));
         }
         Some(_) if !file.header => {

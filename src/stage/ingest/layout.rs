@@ -9,17 +9,23 @@ use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One raw file: delimited text, a workbook, or a file of columns.
+/// One raw file: delimited text, a workbook, a file of columns, or a topic of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
     /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
-    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a file of columns (Parquet; Feather uncompressed or by zstd), for which only
-    /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on.
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; a file of columns (Parquet; Feather and streams of Arrow, uncompressed or by zstd; arrays of NumPy, .npz), for which only
+    /// `columns` matters: a list of numbers in it is a column for each, `state[1]`, `state[2]` and so on; or a recording of ROS 2 (.mcap, .db3,
+    /// or the folder of its parts).
     pub file: RawFile,
     /// The sheet of a workbook; without it the only visible one with rows of numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheet: Option<String>,
+    /// The topic of a recording of ROS 2 (.mcap, .db3), e.g. `/joint_states`; without it the only one whose type is read. Its fields are the
+    /// columns: `received` and `stamp` (s), and by type `shoulder_pan_joint.position`, `point.x`, `data[1]` and so on. Transforms are named
+    /// with their frames: `/tf base->tool0`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
     pub delimiter: String,

@@ -10,6 +10,8 @@ const RAPID: [&str; 12] =
     ["rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6", "eax_a", "eax_b", "eax_c", "eax_d", "eax_e", "eax_f"];
 const KRL: [&str; 12] = ["A1", "A2", "A3", "A4", "A5", "A6", "E1", "E2", "E3", "E4", "E5", "E6"];
 
+const NUMBERED: [&str; 12] = ["J1", "J2", "J3", "J4", "J5", "J6", "E1", "E2", "E3", "E4", "E5", "E6"];
+
 /// The table that a program lists; its joints are in deg.
 pub struct ListedTable {
     /// Names of the columns: `name`, then the axes.
@@ -33,6 +35,8 @@ impl ListedTable {
         Self::of(&list, language).ok_or_else(|| {
             let example = match language {
                 Language::Krl => "DECL E6AXIS XP1={A1 0.0,A2 -90.0,A3 90.0,A4 0.0,A5 0.0,A6 0.0}",
+                Language::Fanuc => "P[1]{ GP1: UF : 0, UT : 1, J1= 0.000 deg, ... J6= 0.000 deg };",
+                Language::UrScript => "wp1_q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]",
                 Language::Rapid => "CONST jointtarget p10:=[[0,-10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];",
             };
             let poses = if list.poses > 0 { format!(" ({} without joints)", counted(list.poses, "pose")) } else { String::new() };
@@ -41,7 +45,11 @@ impl ListedTable {
     }
 
     fn of(list: &JointList, language: Language) -> Option<Self> {
-        let all = if language == Language::Krl { KRL } else { RAPID };
+        let all = match language {
+            Language::Krl => KRL,
+            Language::Rapid => RAPID,
+            Language::Fanuc | Language::UrScript => NUMBERED,
+        };
         // An axis that no position has makes no column.
         let used: Vec<usize> =
             (0..6).filter(|k| list.rows.iter().any(|row| row.external.get(*k).is_some_and(Option::is_some))).collect();

@@ -176,7 +176,8 @@ pub struct UncertaintyColumn {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointColumns {
-    /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`.
+    /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`; `{name}` is its name in the robot file:
+    /// `{name}.position`.
     #[serde(default)]
     pub column: Option<String>,
     /// Names or numbers of the columns from the first joint to the last, instead of a pattern.

@@ -11,7 +11,8 @@ use super::row::RowReader;
 use crate::error::{Error, Result, counted};
 use crate::program::listing as language;
 use crate::raw::{
-    self, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook, failed, has_columns, is_workbook, not_read,
+    self, BagRows, ColumnRows, Delimiter, Record, RecordReader, TextLayout, TextRows, Workbook, failed, has_columns, is_bag,
+    is_workbook, not_read,
 };
 use crate::stage::{Context, OpenedInput};
 use crate::table::RejectedRow;
@@ -34,6 +35,12 @@ fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordRea
         let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
         return Err(Error::data(label, message));
     }
+    let is_bag = is_bag(head);
+    if let Some(topic) = layout.topic.as_ref().filter(|_| !is_bag) {
+        let message =
+            format!("is no recording of ROS 2, and has no topic `{topic}`; allowed: a file .mcap or .db3, or no `topic`");
+        return Err(Error::data(label, message));
+    }
     let delimiter = Delimiter::parse(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
     let FileLayout { comment, header_in_comment, skip, .. } = layout.clone();
     let text = TextLayout { delimiter, comment, header_in_comment, skip };
@@ -44,6 +51,8 @@ fn records(source: OpenedInput, layout: &FileLayout) -> Result<Box<dyn RecordRea
         let lines = book.lines(&name, if layout.decimal == Decimal::Comma { ',' } else { '.' }).map_err(data)?;
         let text = TextLayout { delimiter: Delimiter::Byte(b'\t'), ..text };
         Box::new(TextRows::open(Cursor::new(lines), &format!("{label} sheet `{name}`"), text)?)
+    } else if is_bag {
+        Box::new(BagRows::open(reader.into_inner(), label, layout.topic.as_deref())?)
     } else if let Some(language) = language(&raw::ending(Path::new(label)), head) {
         listing::open(reader, label, language)?
     } else if has_columns(head) {
@@ -101,6 +110,7 @@ impl<'a> OpenedFile<'a> {
             reader.skip(layout.skip_below_header)?;
         }
         let binding = bind(layout, &head, arm)?;
+        reader.only(&binding.columns());
         let row = RecordedRow::empty(arm);
         let names = head.names.iter().flatten().enumerate();
         let unmapped = names.filter(|(column, _)| binding.cells.iter().all(|cell| cell.column != *column));
@@ -111,6 +121,10 @@ impl<'a> OpenedFile<'a> {
     /// What was left out of the file as a whole, and what it lacks.
     pub(super) fn remarks(&self) -> Vec<String> {
         self.remark.iter().chain(&self.binding().missing).cloned().collect()
+    }
+    /// What could not be read of the file, once its last row was.
+    pub(super) fn loss(&self) -> Option<String> {
+        self.reader.loss().map(|loss| format!("{}: {loss}", self.label))
     }
     pub(super) fn binding(&self) -> &Binding {
         &self.judge.binding

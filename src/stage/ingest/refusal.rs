@@ -1,5 +1,7 @@
 //! Why a row is not used.
 
+use crate::raw::RecordFault;
+
 /// Why a row is not used; the stable word in the table `rejected`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reason {
@@ -13,6 +15,9 @@ pub(super) enum Reason {
     OutOfOrder,
     DuplicateId,
     DuplicateRow,
+    DoubledStamp,
+    Foreign,
+    Damaged,
     Unmatched,
 }
 
@@ -29,7 +34,20 @@ impl Reason {
             Self::OutOfOrder => "out_of_order",
             Self::DuplicateId => "duplicate_id",
             Self::DuplicateRow => "duplicate_row",
+            Self::DoubledStamp => "doubled_stamp",
+            Self::Foreign => "foreign",
+            Self::Damaged => "damaged",
             Self::Unmatched => "unmatched",
+        }
+    }
+}
+
+impl From<RecordFault> for Reason {
+    fn from(fault: RecordFault) -> Self {
+        match fault {
+            RecordFault::Damaged => Self::Damaged,
+            RecordFault::Foreign => Self::Foreign,
+            RecordFault::DoubledStamp => Self::DoubledStamp,
         }
     }
 }

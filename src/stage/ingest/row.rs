@@ -42,6 +42,9 @@ impl<'a> RowReader<'a> {
         row.points.clear();
         self.binding.filled.iter().for_each(|place| row.values[*place] = f64::NAN);
         row.is_blank = record.is_blank(0);
+        if let Some((fault, detail)) = &record.fault {
+            return refuse((*fault).into(), detail.clone());
+        }
         if row.is_blank {
             return refuse(Reason::Blank, "the whole row is blank".into());
         }

@@ -77,6 +77,8 @@ pub(super) struct Scan {
     pub measured: Option<u64>,
     /// Ids of the first usable rows with their data rows, for a join by id.
     pub first_ids: Vec<(u32, String)>,
+    /// What could not be read of the file.
+    loss: Option<String>,
 }
 
 /// Ids that are kept for examples.
@@ -103,6 +105,7 @@ impl Scan {
             samples: None,
             measured: open.binding().measures.then_some(0),
             first_ids: Vec::new(),
+            loss: None,
         }
     }
     /// How far a joint turns over the rows at most, rad or m.
@@ -134,6 +137,7 @@ pub(super) fn files(settings: &Ingest, arm: &RobotJoints, most: usize, context: 
     // Of several faults that of the first file.
     let mut scans = scans.into_iter().collect::<Result<Vec<_>>>()?;
     for scan in &mut scans {
+        scan.loss.take().into_iter().for_each(|loss| context.services.warn(loss));
         let track = |samples: JointSamples| samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context);
         scan.track = scan.samples.take().map(track).transpose()?;
     }
@@ -196,7 +200,7 @@ fn file(
     }
     pace.tell(open.bytes());
     open.external.must_stand(&open.label, arm.joints())?;
-    (scan.lines, scan.read) = (open.lines(), open.row.number);
+    (scan.lines, scan.read, scan.loss) = (open.lines(), open.row.number, open.loss());
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
     }

@@ -192,6 +192,7 @@ impl<'a> MotionRows<'a> {
         let size = source.size;
         let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
         let label = open.label.clone();
+        open.remarks().iter().for_each(|remark| context.services.note(format!("{label}: {remark}")));
         let progress = FileProgress::begin(context, &format!("reading {label}"), size, "bytes");
         self.signal_of(&open, &label)?;
         let given = open.binding().slots();
@@ -215,6 +216,7 @@ impl<'a> MotionRows<'a> {
             pace.row(open.bytes());
         }
         let read = open.row.number;
+        open.loss().into_iter().for_each(|loss| context.services.warn(loss));
         self.few_rejected(&label, read, accepted, &refused)?;
         context.services.note(format!("{name}: {} read, {accepted} used, {} rejected", counted(read, "row"), read - accepted));
         Ok(IntakeRow {

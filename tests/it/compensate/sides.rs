@@ -127,7 +127,7 @@ fn every_posture_that_a_program_states_is_reached_as_its_joints_are() {
                     Language::Krl => {
                         PostureStatement::StatusTurn { status: Some(status(&maker, q)), turn: Some(turn(&maker, q)) }
                     }
-                    Language::Rapid => PostureStatement::Configuration(confdata(&maker, q)),
+                    _ => PostureStatement::Configuration(confdata(&maker, q)),
                 };
                 assert_eq!(target.posture, stated, "{} {name}: {q:?}", maker.name);
             }
@@ -181,7 +181,7 @@ fn a_joint_that_the_correction_takes_over_its_zero_is_stated_anew() {
         assert!([0, 3, 5].iter().any(|joint| driven[*joint] < -1e-5), "{driven:?}");
         let stated = match language {
             Language::Krl => PostureStatement::StatusTurn { status: Some(2), turn: Some(turn(&PLAIN, &driven)) },
-            Language::Rapid => PostureStatement::Configuration(confdata(&PLAIN, &driven)),
+            _ => PostureStatement::Configuration(confdata(&PLAIN, &driven)),
         };
         assert_eq!(target.posture, stated, "{}", String::from_utf8_lossy(&written.bytes));
         assert!(

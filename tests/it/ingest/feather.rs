@@ -81,3 +81,60 @@ fn a_feather_file_that_cannot_be_read_is_refused_with_a_reason() {
     let said = refused(&|bytes| [b"FEA1", &bytes[4..]].concat());
     assert!(said.contains("is a Feather file of version 1; allowed: version 2"), "{said}");
 }
+
+/// An array of NumPy, version 1, as `numpy.save` writes it.
+fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+    let length = (head.len() + 11).next_multiple_of(64) - 10;
+    head = format!("{head:<0$}\n", length - 1);
+    [b"\x93NUMPY\x01\x00", &(length as u16).to_le_bytes()[..], head.as_bytes(), data].concat()
+}
+
+#[test]
+fn a_stream_of_arrow_and_arrays_of_numpy_are_read_as_columns() {
+    use calib::raw::{ColumnRows, Record, RecordReader, has_columns, is_workbook};
+    use std::io::Write;
+    let rows = |bytes: &[u8]| {
+        assert!(has_columns(bytes) && !is_workbook(bytes));
+        let (mut reader, mut record, mut rows) = (ColumnRows::open(bytes, "run").unwrap(), Record::default(), Vec::new());
+        while reader.next(&mut record).unwrap() {
+            rows.push(record.cells());
+        }
+        (rows, reader.remark())
+    };
+    let batch = RecordBatch::try_from_iter([("q", Arc::new(Float64Array::from(vec![0.5, -1.25])) as ArrayRef)]).unwrap();
+    let mut stream = arrow_ipc::writer::StreamWriter::try_new(Vec::new(), &batch.schema()).unwrap();
+    stream.write(&batch).unwrap();
+    let stream = stream.into_inner().unwrap();
+    assert_eq!(rows(&stream).0, [["q"], ["0.5"], ["-1.25"]]);
+
+    let floats = |numbers: &[f64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let names: Vec<u8> = ["P1", "P\u{e4}2"]
+        .iter()
+        .flat_map(|name| name.chars().chain(std::iter::repeat('\0')).take(3).flat_map(|letter| (letter as u32).to_le_bytes()))
+        .collect();
+    let big: Vec<u8> = [7i32, -2].iter().flat_map(|number| number.to_be_bytes()).collect();
+    for (name, array) in [
+        ("q", npy("<f8", "(2, 3)", &floats(&[0.1, 0.2, 0.3, 1.1, 1.2, 1.3]))),
+        ("time_ns", npy("<i8", "(2,)", &[1_700_000_000_123_456_789i64, -1].map(i64::to_le_bytes).concat())),
+        ("name", npy("<U3", "(2,)", &names)),
+        ("count", npy(">i4", "(2,)", &big)),
+        ("rate", npy("<f8", "()", &floats(&[125.0]))),
+    ] {
+        archive.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default()).unwrap();
+        archive.write_all(&array).unwrap();
+    }
+    let bytes = archive.finish().unwrap().into_inner();
+    let (found, remark) = rows(&bytes);
+    assert_eq!(found[0], ["q[1]", "q[2]", "q[3]", "time_ns", "name", "count"]);
+    assert_eq!(found[1], ["0.1", "0.2", "0.3", "1700000000123456789", "P1", "7"]);
+    assert_eq!(found[2], ["1.1", "1.2", "1.3", "-1", "P\u{e4}2", "-2"]);
+    assert_eq!(remark.as_deref(), Some("arrays of another length than 2 left out: `rate` (0 rows)"));
+    // Damaged bytes are a fault of the file.
+    for at in 0..bytes.len() {
+        let mut changed = bytes.clone();
+        changed[at] ^= 0x5a;
+        let _ = ColumnRows::open(&changed[..], "run").map(|mut reader| reader.next(&mut Record::default()));
+    }
+}

@@ -148,7 +148,7 @@ files:
             "files[0].columns.y.unit: `deg` is the unit of another quantity; allowed: mm, um, m, in",
             "files[0].columns.z: say `column` or `value`, one of them",
             "files[0].columns.sigma_x.unit: no unit; allowed: mm, um, m, in",
-            "files[0].columns.q.column: `qj` has no {j} for the joint's number; e.g. `q{j}_deg`, or list them in `columns`",
+            "files[0].columns.q.column: `qj` has neither {j} for the joint's number nor {name}; e.g. `q{j}_deg`, or list them in `columns`",
             "files[0].columns.q.unit: unknown unit `degrees`; allowed: rad, deg, mrad, arcsec",
             "files[0].columns: map all of sigma_x, sigma_y, sigma_z, or none",
         ]

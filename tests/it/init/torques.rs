@@ -114,18 +114,14 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
 #[test]
 fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
     for (name, content, said) in [
-        ("measure.ls", &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..], "is a FANUC program"),
+        ("measure.txt", &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..], "is a FANUC program (a listing of TP): name it .ls"),
         (
             "measure.prg.txt",
             b"MODULE Measure\n  CONST jointtarget p1:=[[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
             "is an ABB program in RAPID: name it .mod or .prg",
         ),
-        (
-            "run.db3",
-            b"SQLite format 3\0\x10\x00\x01\x01\x00",
-            "a bag of ROS 2), which is not read yet: write its joint states as text",
-        ),
-        ("run.mcap", b"\x89MCAP0\r\n\x01\x00", "is a recording in MCAP, which is not read yet"),
+        ("run.db3", b"SQLite format 3\0\x10\x00\x01\x01\x00", "its first page is damaged"),
+        ("run.mcap", b"\x89MCAP0\r\n\x01\x00", "it has no end: a recorder that was stopped, or a copy that was cut"),
     ] {
         let made = made(&[(name, content.to_vec())]);
         assert!(made.said.contains(said), "{name}: {}", made.said);

@@ -231,7 +231,7 @@ fn found(program: &Program) -> Targets {
 }
 
 /// The bytes outside of the numbers of targets, and of the blank between a name and a number.
-fn rest(text: &[u8], program: &Program) -> Vec<u8> {
+pub fn rest(text: &[u8], program: &Program) -> Vec<u8> {
     let mut spans: Vec<_> = program.literals().iter().flat_map(|literal| literal.spans.clone()).collect();
     spans.sort_by_key(|span| span.start);
     let mut out = Vec::new();

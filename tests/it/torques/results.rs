@@ -210,7 +210,7 @@ fn what_a_format_does_not_hold_of_torques_is_said_with_its_size() {
     let refused = calib(&["export", "HEAD", "--format", "dh"], &solved().path("store"));
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(2), "{told}");
-    assert!(told.contains("allowed: urdf, json, mjcf, dynamics"), "{told}");
+    assert!(told.contains("allowed: urdf, json, mjcf, sdf, dynamics"), "{told}");
 }
 
 /// A motion as its user has it, of one stretch of rows.

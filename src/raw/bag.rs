@@ -1,0 +1,297 @@
+//! Recordings of ROS 2 (MCAP, SQLite) as the same records that text gives: one topic is a table, a message a row.
+//!
+//! Every message is read where it lies, from the first byte to the last whole one, so that a bag without an index, or one that was cut, gives
+//! what is there. A folder of parts is one recording.
+
+mod content;
+mod mcap;
+mod message;
+mod sqlite;
+
+use super::record::{Record, RecordFault, RecordReader};
+use super::source::Source;
+use crate::error::{Error, Result};
+pub use content::{BagContent, BagTopic, bag_content};
+use content::{no_topic, only_topic};
+use message::{Cell, Cells, KINDS, Kind};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Messages that say which columns there are, and bytes of them at most.
+const HEAD: usize = 4096;
+const HEAD_BYTES: usize = 64 << 20;
+/// Names of joints may come and go: so many columns at most.
+const WIDEST: usize = 4096;
+
+/// What is recorded under one name.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Topic {
+    name: String,
+    /// Its type, e.g. `sensor_msgs/msg/JointState`.
+    kind: String,
+    encoding: String,
+}
+
+impl Topic {
+    /// What is known of its type, where it is read.
+    fn known(&self) -> Option<&'static Kind> {
+        KINDS.iter().find(|kind| self.encoding == "cdr" && kind.name == self.kind)
+    }
+}
+
+/// One message as it is recorded.
+#[derive(Debug, Clone, Default)]
+struct Message {
+    topic: Arc<Topic>,
+    /// When the recorder received it, ns since 1970.
+    received: i64,
+    data: Vec<u8>,
+}
+
+/// A file of messages.
+trait Container: Send {
+    /// The next message of a topic of which a name is wanted; false at the end. Fails with what is lost, once.
+    fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> std::result::Result<bool, String>;
+    /// What a person should know of how it was recorded.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+    /// Topics that were met so far.
+    fn topics(&self) -> Vec<Arc<Topic>>;
+    /// Place in the source.
+    fn position(&self) -> u64;
+    /// Gives the source back.
+    fn into_source(self: Box<Self>) -> Box<dyn Source>;
+}
+
+/// Whether a file that begins so is a bag.
+pub fn is_bag(head: &[u8]) -> bool {
+    head.starts_with(mcap::MAGIC) || head.starts_with(sqlite::MAGIC)
+}
+
+/// The messages of all parts of a bag.
+struct Messages {
+    source: Option<Box<dyn Source>>,
+    container: Option<Box<dyn Container>>,
+    bounds: Vec<u64>,
+    /// The next part.
+    part: usize,
+    topics: Vec<Arc<Topic>>,
+    losses: Vec<String>,
+}
+
+impl Messages {
+    fn open(mut source: Box<dyn Source>) -> std::io::Result<Self> {
+        let bounds = source.bounds()?;
+        Ok(Self { source: Some(source), container: None, bounds, part: 0, topics: Vec::new(), losses: Vec::new() })
+    }
+    fn lose(&mut self, what: &str) {
+        let several = self.bounds.len() > 2;
+        self.losses.push(if several { format!("part {}: {what}", self.part) } else { what.into() });
+    }
+    fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> bool {
+        loop {
+            if self.container.is_none() && !self.begin() {
+                return false;
+            }
+            let Some(container) = &mut self.container else { continue };
+            let next = container.next(wanted, message);
+            if let Ok(true) = next {
+                return true;
+            }
+            for topic in container.topics() {
+                if !self.topics.contains(&topic) {
+                    self.topics.push(topic);
+                }
+            }
+            self.source = self.container.take().map(Container::into_source);
+            if let Err(lost) = next {
+                self.lose(&lost);
+            }
+        }
+    }
+    /// Opens the next part; false where there is none.
+    fn begin(&mut self) -> bool {
+        let Some(bounds) = self.bounds.get(self.part..self.part + 2).map(|two| [two[0], two[1]]) else { return false };
+        let Some(mut source) = self.source.take() else { return false };
+        self.part += 1;
+        let mut head = [0; 16];
+        let most = (bounds[1] - bounds[0]).min(16) as usize;
+        let begins = source.seek(std::io::SeekFrom::Start(bounds[0])).and_then(|_| source.read_exact(&mut head[..most]));
+        let back = source.seek(std::io::SeekFrom::Start(bounds[0]));
+        let opened: std::result::Result<Box<dyn Container>, _> = match begins.and(back) {
+            Ok(_) if head.starts_with(mcap::MAGIC) => Ok(Box::new(mcap::McapMessages::open(source, bounds))),
+            Ok(_) if head.starts_with(sqlite::MAGIC) => {
+                sqlite::SqliteMessages::open(source, bounds).map(|bag| Box::new(bag) as Box<dyn Container>)
+            }
+            Ok(_) => Err((source, "it is no bag".to_string())),
+            Err(error) => Err((source, error.to_string())),
+        };
+        match opened {
+            Ok(container) => self.container = Some(container),
+            Err((source, lost)) => {
+                self.source = Some(source);
+                self.lose(&lost);
+            }
+        }
+        true
+    }
+    fn position(&self) -> u64 {
+        let before = self.bounds.get(self.part).or(self.bounds.last()).copied().unwrap_or_default();
+        self.container.as_ref().map_or(before, |container| container.position())
+    }
+}
+
+/// Reads one topic of a bag, message by message.
+pub struct BagRows {
+    label: String,
+    messages: Messages,
+    /// The topic, and the frames of it that are wanted.
+    topic: String,
+    frames: Option<String>,
+    kind: &'static Kind,
+    /// Messages that were read for their columns, and are still to be handed out.
+    head: VecDeque<Message>,
+    message: Message,
+    cells: Cells,
+    is_named: bool,
+    /// Columns that are asked for: whether a row may lack them.
+    wanted: Option<Vec<Option<bool>>>,
+    rows: u64,
+    /// Stamp and number of the last message that is a row.
+    last: Option<(i64, u64)>,
+    text: zmij::Buffer,
+}
+
+impl BagRows {
+    /// Opens a topic; without a name the only one whose type is read.
+    pub fn open(source: Box<dyn Source>, label: &str, topic: Option<&str>) -> Result<Self> {
+        let failed = |error: std::io::Error| super::failed(label, &error);
+        let (source, topic) = match topic {
+            Some(topic) => (source, topic.to_string()),
+            None => only_topic(source, label)?,
+        };
+        let (name, frames) = topic.split_once(' ').map_or((topic.as_str(), None), |(name, frames)| (name, Some(frames)));
+        let mut messages = Messages::open(source).map_err(failed)?;
+        let (mut head, mut cells, mut bytes) = (VecDeque::new(), Cells::default(), 0);
+        ["received", "stamp"].into_iter().for_each(|name| cells.set(name, Cell::Absent));
+        let (mut message, mut kind) = (Message::default(), None);
+        while head.len() < HEAD && bytes < HEAD_BYTES && messages.next(&|other| other == name, &mut message) {
+            let found = message.topic.known().filter(|kind| kind.of_frames == frames.is_some());
+            let Some(found) = kind.or(found) else { break };
+            kind = Some(found);
+            bytes += message.data.len();
+            // What cannot be read is told of its row.
+            if message::read(found, frames, &message.data, &mut cells).unwrap_or(true) && cells.names.len() <= WIDEST {
+                head.push_back(message.clone());
+            }
+        }
+        let Some(kind) = kind.filter(|_| !head.is_empty()) else {
+            let source = messages.source.or_else(|| messages.container.map(Container::into_source));
+            let source = source.ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
+            return Err(Error::data(label, no_topic(&topic, &bag_content(source, label)?)));
+        };
+        cells.is_closed = true;
+        let (label, topic, frames) = (label.into(), name.to_string(), frames.map(String::from));
+        let text = zmij::Buffer::new();
+        Ok(Self {
+            label,
+            messages,
+            topic,
+            frames,
+            kind,
+            head,
+            message,
+            cells,
+            is_named: false,
+            wanted: None,
+            rows: 0,
+            last: None,
+            text,
+        })
+    }
+
+    /// Why a message is not used, if so.
+    fn fault(&mut self, read: std::result::Result<bool, String>) -> Option<(RecordFault, String)> {
+        if let Err(why) = read {
+            return Some((RecordFault::Damaged, why));
+        }
+        let needed = self.wanted.iter().flatten().zip(&self.cells.cells).enumerate();
+        if let Some((column, _)) = needed.into_iter().find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == Cell::Absent)
+        {
+            let names = self.cells.joints();
+            let has = if names.is_empty() { String::new() } else { format!("; its joints: {names}") };
+            return Some((RecordFault::Foreign, format!("the message has no `{}`{has}", self.cells.names[column])));
+        }
+        let Some(Cell::Time(stamp)) = self.cells.cells.get(1) else { return None };
+        let before = self.last.replace((*stamp, self.rows));
+        let (_, number) = before.filter(|(before, _)| before == stamp)?;
+        self.last = before;
+        Some((RecordFault::DoubledStamp, format!("message {number} has the same stamp, {} s", time(*stamp))))
+    }
+}
+
+/// Nanoseconds as seconds, without rounding.
+fn time(ns: i64) -> String {
+    let (whole, rest) = (ns.unsigned_abs() / 1_000_000_000, ns.unsigned_abs() % 1_000_000_000);
+    format!("{}{whole}.{rest:09}", if ns < 0 { "-" } else { "" })
+}
+
+impl RecordReader for BagRows {
+    fn label(&self) -> &str {
+        &self.label
+    }
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
+        record.begin(self.rows);
+        if !std::mem::replace(&mut self.is_named, true) {
+            self.cells.names.iter().for_each(|name| record.push(name.as_bytes()));
+            return Ok(true);
+        }
+        let read = loop {
+            match self.head.pop_front() {
+                Some(message) => self.message = message,
+                None if self.messages.next(&|name| name == self.topic, &mut self.message) => {}
+                None => return Ok(false),
+            }
+            match message::read(self.kind, self.frames.as_deref(), &self.message.data, &mut self.cells) {
+                Ok(false) => {}
+                read => break read,
+            }
+        };
+        self.rows += 1;
+        record.begin(self.rows);
+        self.cells.cells[0] = Cell::Time(self.message.received);
+        record.fault = self.fault(read);
+        for (column, cell) in self.cells.cells.iter().enumerate() {
+            let is_asked = self.wanted.as_ref().is_none_or(|wanted| wanted.get(column).is_some_and(Option::is_some));
+            match cell {
+                Cell::Number(number) if is_asked => record.push(self.text.format(*number).as_bytes()),
+                Cell::Time(ns) if is_asked => record.push(time(*ns).as_bytes()),
+                Cell::Text(text) if is_asked => record.push(text.as_bytes()),
+                _ => record.push(b""),
+            }
+        }
+        Ok(true)
+    }
+    fn lines(&self) -> u64 {
+        self.rows
+    }
+    fn bytes(&self) -> u64 {
+        self.messages.position()
+    }
+    fn only(&mut self, columns: &[(usize, bool)]) {
+        let mut wanted = vec![None; self.cells.names.len()];
+        columns.iter().for_each(|(column, needed)| {
+            if let Some(place) = wanted.get_mut(*column) {
+                *place = Some(place.unwrap_or(false) || *needed);
+            }
+        });
+        self.wanted = Some(wanted);
+    }
+    fn remark(&self) -> Option<String> {
+        self.messages.container.as_ref().and_then(|container| container.remark())
+    }
+    fn loss(&self) -> Option<String> {
+        (!self.messages.losses.is_empty()).then(|| self.messages.losses.join("; "))
+    }
+}

@@ -1,0 +1,126 @@
+//! What a bag holds: its topics with their rates and gaps, which of them are read, and what is lost.
+
+use super::message::{self, KINDS};
+use super::{Message, Messages};
+use crate::error::{Error, Result, counted};
+use crate::raw::{Source, failed};
+use std::collections::BTreeMap;
+
+/// What a bag holds of one topic; of one of frames, of one pair of them.
+#[derive(Debug, Clone, Default)]
+pub struct BagTopic {
+    /// As the setting `topic` names it.
+    pub name: String,
+    /// Its type.
+    pub kind: String,
+    /// Whether messages of this type are read.
+    pub is_read: bool,
+    /// How many.
+    pub messages: u64,
+    /// When the first and the last were received, s since 1970.
+    pub received: [f64; 2],
+    /// The longest time between two of them, s.
+    pub gap: f64,
+}
+
+impl BagTopic {
+    fn see(&mut self, received: f64) {
+        if self.messages > 0 {
+            self.gap = self.gap.max(received - self.received[1]);
+        } else {
+            self.received[0] = received;
+        }
+        self.received[1] = received;
+        self.messages += 1;
+    }
+    /// In a line: type, number, rate, longest gap.
+    pub fn account(&self) -> String {
+        let Self { name, kind, messages, received: [first, last], gap, .. } = self;
+        let span = last - first;
+        let rate =
+            if span > 0.0 { format!(", {:.4} Hz, longest gap {gap:.4} s", (*messages - 1) as f64 / span) } else { String::new() };
+        let not = if self.is_read { "" } else { "; this type is not read" };
+        format!("topic `{name}`: {kind}, {}{rate}{not}", counted(*messages, "message"))
+    }
+}
+
+/// What a bag holds.
+pub struct BagContent {
+    /// Its topics by name.
+    pub topics: Vec<BagTopic>,
+    /// What of it is lost.
+    pub loss: Option<String>,
+    source: Box<dyn Source>,
+}
+
+/// Reads a bag once for what it holds.
+pub fn bag_content(source: Box<dyn Source>, label: &str) -> Result<BagContent> {
+    let mut messages = Messages::open(source).map_err(|error| failed(label, &error))?;
+    let (mut message, mut found) = (Message::default(), BTreeMap::<String, BagTopic>::new());
+    while messages.next(&|_| true, &mut message) {
+        let topic = &message.topic;
+        let kind = topic.known();
+        let names = match kind.filter(|kind| kind.of_frames) {
+            Some(_) => message::frames(&message.data).into_iter().map(|frames| format!("{} {frames}", topic.name)).collect(),
+            None => vec![topic.name.clone()],
+        };
+        for name in names {
+            let new =
+                || BagTopic { name: name.clone(), kind: topic.kind.clone(), is_read: kind.is_some(), ..BagTopic::default() };
+            found.entry(name.clone()).or_insert_with(new).see(message.received as f64 * 1e-9);
+        }
+    }
+    for topic in messages.topics {
+        let of_frames = topic.known().is_some_and(|kind| kind.of_frames);
+        if !of_frames && !found.contains_key(&topic.name) {
+            let is_read = topic.known().is_some();
+            found.insert(
+                topic.name.clone(),
+                BagTopic { name: topic.name.clone(), kind: topic.kind.clone(), is_read, ..BagTopic::default() },
+            );
+        }
+    }
+    let loss = (!messages.losses.is_empty()).then(|| messages.losses.join("; "));
+    let source = messages.source.ok_or_else(|| Error::Bug("a bag without its bytes".into()))?;
+    Ok(BagContent { topics: found.into_values().collect(), loss, source })
+}
+
+/// The only topic of a bag whose type is read.
+pub(super) fn only_topic(source: Box<dyn Source>, label: &str) -> Result<(Box<dyn Source>, String)> {
+    let content = bag_content(source, label)?;
+    let mut read = content.topics.iter().filter(|topic| topic.is_read && topic.messages > 0);
+    match (read.next(), read.next()) {
+        (Some(only), None) => Ok((content.source, only.name.clone())),
+        (None, _) => Err(Error::data(label, no_topic("", &content))),
+        _ => Err(Error::data(label, format!("holds several topics; say which, `topic: NAME`; {}", listed(&content.topics)))),
+    }
+}
+
+fn listed(found: &[BagTopic]) -> String {
+    let allowed: Vec<String> = found.iter().filter(|topic| topic.is_read).map(|topic| format!("`{}`", topic.name)).collect();
+    if allowed.is_empty() { "none of its topics is read".into() } else { format!("allowed: {}", allowed.join(", ")) }
+}
+
+/// Why nothing is read of a topic.
+pub(super) fn no_topic(topic: &str, content: &BagContent) -> String {
+    let found = &content.topics;
+    let kinds = || KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
+    let message = match found.iter().find(|other| other.name == topic) {
+        Some(other) if !other.is_read => {
+            format!("topic `{topic}` holds {}, which is not read; allowed: {}", other.kind, kinds())
+        }
+        _ if found.is_empty() => "holds no message".into(),
+        _ => {
+            let others: Vec<String> =
+                found.iter().filter(|topic| !topic.is_read).map(|one| format!("`{}` ({})", one.name, one.kind)).collect();
+            let others = if others.is_empty() { String::new() } else { format!("; of other types: {}", others.join(", ")) };
+            let first = if topic.is_empty() {
+                "has no topic that is read".into()
+            } else {
+                format!("has no messages of a topic `{topic}`")
+            };
+            format!("{first}; {}{others}", listed(found))
+        }
+    };
+    message + &content.loss.iter().map(|loss| format!("; {loss}")).collect::<String>()
+}

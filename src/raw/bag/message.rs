@@ -1,0 +1,312 @@
+//! Messages of ROS 2 as cells: which types are read, a row of a table each, and CDR (both orders of bytes, as DDS writes it).
+//!
+//! CDR is read here by hand: a dozen lines for each kind of value, without a description of types that must be compiled first.
+
+use std::collections::HashMap;
+
+/// A part of a message, in the order in which they stand.
+enum Part {
+    /// A time of the header: the column `stamp`.
+    Stamp,
+    /// A text: a column of this name.
+    Text(&'static str),
+    /// A number of 64 bits: a column of this name.
+    Number(&'static str),
+    /// Names of joints.
+    Names,
+    /// A list of numbers, one for each name: columns `NAME.position`, and so on. It may be empty.
+    OfNames(&'static str),
+    /// What says of how many dimensions a list is.
+    Dimensions,
+    /// A list of numbers: columns `data[1]`, `data[2]`, and so on.
+    List(&'static str),
+}
+
+/// A type of message that is read.
+pub(super) struct Kind {
+    pub name: &'static str,
+    /// It holds any number of them; which one is read is said by its two frames.
+    pub of_frames: bool,
+    parts: &'static [Part],
+}
+
+use Part::{Dimensions, List, Names, Number, OfNames, Stamp, Text};
+
+const TRANSFORM: &[Part] = &[
+    Stamp,
+    Text("frame_id"),
+    Text("child_frame_id"),
+    Number("translation.x"),
+    Number("translation.y"),
+    Number("translation.z"),
+    Number("rotation.x"),
+    Number("rotation.y"),
+    Number("rotation.z"),
+    Number("rotation.w"),
+];
+
+/// Types of messages that are read.
+pub(super) const KINDS: &[Kind] = &[
+    Kind {
+        name: "sensor_msgs/msg/JointState",
+        of_frames: false,
+        parts: &[Stamp, Text("frame_id"), Names, OfNames("position"), OfNames("velocity"), OfNames("effort")],
+    },
+    Kind {
+        name: "geometry_msgs/msg/PointStamped",
+        of_frames: false,
+        parts: &[Stamp, Text("frame_id"), Number("point.x"), Number("point.y"), Number("point.z")],
+    },
+    Kind {
+        name: "geometry_msgs/msg/PoseStamped",
+        of_frames: false,
+        parts: &[
+            Stamp,
+            Text("frame_id"),
+            Number("position.x"),
+            Number("position.y"),
+            Number("position.z"),
+            Number("orientation.x"),
+            Number("orientation.y"),
+            Number("orientation.z"),
+            Number("orientation.w"),
+        ],
+    },
+    Kind { name: "geometry_msgs/msg/TransformStamped", of_frames: false, parts: TRANSFORM },
+    Kind { name: "tf2_msgs/msg/TFMessage", of_frames: true, parts: TRANSFORM },
+    Kind {
+        name: "sensor_msgs/msg/Temperature",
+        of_frames: false,
+        parts: &[Stamp, Text("frame_id"), Number("temperature"), Number("variance")],
+    },
+    Kind { name: "std_msgs/msg/Float64", of_frames: false, parts: &[Number("data")] },
+    Kind { name: "std_msgs/msg/Float64MultiArray", of_frames: false, parts: &[Dimensions, List("data")] },
+];
+
+/// Elements of a list, at most.
+const LONGEST: usize = 1 << 16;
+
+/// Bytes of a message, from value to value.
+struct Cdr<'a> {
+    data: &'a [u8],
+    at: usize,
+    is_big: bool,
+}
+
+/// Why a message cannot be read.
+pub(super) type Fault = String;
+
+impl<'a> Cdr<'a> {
+    fn open(message: &'a [u8]) -> Result<Self, Fault> {
+        match message {
+            [0, order @ (0 | 1), _, _, data @ ..] => Ok(Self { data, at: 0, is_big: *order == 0 }),
+            [a, b, ..] => Err(format!("the message is in another form than plain CDR ({a:02x} {b:02x})")),
+            _ => Err("the message is empty".into()),
+        }
+    }
+    fn take(&mut self, bytes: usize, what: &str) -> Result<&'a [u8], Fault> {
+        let taken = self.at.checked_add(bytes).and_then(|end| self.data.get(self.at..end));
+        self.at += bytes;
+        taken.ok_or_else(|| format!("the message ends within `{what}`"))
+    }
+    fn fixed<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Fault> {
+        self.at = self.at.next_multiple_of(N);
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(self.take(N, what)?);
+        if self.is_big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+    fn count(&mut self, what: &str) -> Result<usize, Fault> {
+        self.fixed(what).map(|bytes| u32::from_le_bytes(bytes) as usize)
+    }
+    fn number(&mut self, what: &str) -> Result<f64, Fault> {
+        self.fixed(what).map(f64::from_le_bytes)
+    }
+    fn text(&mut self, what: &str) -> Result<&'a [u8], Fault> {
+        let length = self.count(what)?;
+        let text = self.take(length, what)?;
+        Ok(text.strip_suffix(&[0]).unwrap_or(text))
+    }
+    fn list(&mut self, what: &str) -> Result<usize, Fault> {
+        let count = self.count(what)?;
+        // No element is shorter than a byte.
+        match count <= LONGEST.min(self.data.len()) {
+            true => Ok(count),
+            false => Err(format!("`{what}` says that it has {count} elements")),
+        }
+    }
+}
+
+/// What stands in a column of a row.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) enum Cell {
+    /// The message has no such name.
+    #[default]
+    Absent,
+    /// It has the name, and nothing of this kind for it.
+    Blank,
+    Number(f64),
+    /// Nanoseconds since 1970.
+    Time(i64),
+    Text(String),
+}
+
+/// The columns that messages have, and the cells of the present one.
+#[derive(Default)]
+pub(super) struct Cells {
+    pub names: Vec<String>,
+    pub cells: Vec<Cell>,
+    /// New names make no columns any more.
+    pub is_closed: bool,
+    places: HashMap<String, usize>,
+    /// Names of the joints of the last message as they stand in it, and the columns that are theirs, by name and kind of list.
+    joints: Vec<u8>,
+    columns: Vec<Vec<Option<usize>>>,
+}
+
+impl Cells {
+    /// Sets a cell.
+    pub(super) fn set(&mut self, name: &str, cell: Cell) {
+        if let Some(place) = self.place(name) {
+            self.cells[place] = cell;
+        }
+    }
+    pub(super) fn clear(&mut self) {
+        self.cells.fill(Cell::Absent);
+    }
+    /// Names of joints of the last message.
+    pub(super) fn joints(&self) -> String {
+        let mut cdr = Cdr { data: &self.joints, at: 0, is_big: false };
+        let names = std::iter::from_fn(|| cdr.text("").ok());
+        names.take(20).map(|name| String::from_utf8_lossy(name).into_owned()).collect::<Vec<_>>().join(", ")
+    }
+    fn place(&mut self, name: &str) -> Option<usize> {
+        if let Some(place) = self.places.get(name) {
+            return Some(*place);
+        }
+        if self.is_closed {
+            return None;
+        }
+        self.places.insert(name.into(), self.names.len());
+        self.names.push(name.into());
+        self.cells.push(Cell::Absent);
+        Some(self.names.len() - 1)
+    }
+    /// Takes the names of joints, unless they are those of the message before.
+    fn take_joints(&mut self, names: &[&[u8]]) -> Result<(), Fault> {
+        let mut own = Vec::with_capacity(self.joints.len());
+        for name in names {
+            own.resize(own.len().next_multiple_of(4), 0);
+            own.extend_from_slice(&(name.len() as u32).to_le_bytes());
+            own.extend_from_slice(name);
+        }
+        if own == self.joints && self.is_closed {
+            return Ok(());
+        }
+        self.joints = own;
+        let names: Vec<_> = names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        if let Some(twice) = (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
+            let message = format!("the message names the joint `{}` twice", names[twice]);
+            self.joints.clear();
+            return Err(message);
+        }
+        self.columns = Vec::new();
+        for name in names {
+            let columns = ["position", "velocity", "effort"].map(|what| self.place(&format!("{name}.{what}")));
+            self.columns.push(columns.to_vec());
+        }
+        Ok(())
+    }
+}
+
+fn seconds(cdr: &mut Cdr) -> Result<i64, Fault> {
+    let whole = i32::from_le_bytes(cdr.fixed("stamp")?);
+    Ok(i64::from(whole) * 1_000_000_000 + i64::from(u32::from_le_bytes(cdr.fixed("stamp")?)))
+}
+
+/// Reads the parts of a message into the cells.
+fn parts(kind: &Kind, cdr: &mut Cdr, cells: &mut Cells) -> Result<(), Fault> {
+    let (mut joints, mut list) = (0, 0);
+    for part in kind.parts {
+        match part {
+            Stamp => {
+                let stamp = seconds(cdr)?;
+                // A publisher that does not know the time leaves it at 0.
+                cells.set("stamp", if stamp == 0 { Cell::Blank } else { Cell::Time(stamp) });
+            }
+            Text(name) => {
+                let text = cdr.text(name)?;
+                cells.set(name, Cell::Text(String::from_utf8_lossy(text).into_owned()));
+            }
+            Number(name) => {
+                let number = cdr.number(name)?;
+                cells.set(name, Cell::Number(number));
+            }
+            Names => {
+                joints = cdr.list("name")?;
+                let names = (0..joints).map(|_| cdr.text("name")).collect::<Result<Vec<_>, _>>()?;
+                cells.take_joints(&names)?;
+            }
+            OfNames(name) => {
+                let count = cdr.list(name)?;
+                if count != joints && count != 0 {
+                    return Err(format!("`{name}` has {count} numbers for {joints} names"));
+                }
+                for joint in 0..joints {
+                    let cell = if count == 0 { Cell::Blank } else { Cell::Number(cdr.number(name)?) };
+                    if let Some(place) = cells.columns[joint][list] {
+                        cells.cells[place] = cell;
+                    }
+                }
+                list += 1;
+            }
+            Dimensions => {
+                for _ in 0..cdr.list("layout")? {
+                    cdr.text("layout")?;
+                    cdr.count("layout")?;
+                    cdr.count("layout")?;
+                }
+                cdr.count("layout")?;
+            }
+            List(name) => {
+                for index in 1..=cdr.list(name)? {
+                    let number = cdr.number(name)?;
+                    cells.set(&format!("{name}[{index}]"), Cell::Number(number));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reads a message; of one of frames the transform between these. Whether there is one; fails where it cannot be read.
+pub(super) fn read(kind: &Kind, frames: Option<&str>, message: &[u8], cells: &mut Cells) -> Result<bool, Fault> {
+    cells.clear();
+    let mut cdr = Cdr::open(message)?;
+    let Some(wanted) = frames else { return parts(kind, &mut cdr, cells).map(|()| true) };
+    for _ in 0..cdr.list("transforms")? {
+        let at = cdr.at;
+        if frames_of(&mut cdr)? == wanted {
+            cdr.at = at;
+            return parts(kind, &mut cdr, cells).map(|()| true);
+        }
+    }
+    Ok(false)
+}
+
+/// The frames of a transform, as a topic names them; what follows is the next transform.
+fn frames_of(cdr: &mut Cdr) -> Result<String, Fault> {
+    seconds(cdr)?;
+    let [parent, child] = [cdr.text("frame_id")?, cdr.text("child_frame_id")?].map(String::from_utf8_lossy);
+    (0..7).try_for_each(|_| cdr.number("transform").map(drop))?;
+    Ok(format!("{parent}->{child}"))
+}
+
+/// All frames of a message of frames; none where it cannot be read.
+pub(super) fn frames(message: &[u8]) -> Vec<String> {
+    let Ok(mut cdr) = Cdr::open(message) else { return Vec::new() };
+    let count = cdr.list("transforms").unwrap_or_default();
+    (0..count).map_while(|_| frames_of(&mut cdr).ok()).collect()
+}

@@ -1,0 +1,315 @@
+//! Recordings of ROS 2 are read as they lie: every container and order of bytes, joints by name, and what is not whole with a reason.
+
+mod write;
+
+use crate::compensate::calib;
+use calib::error::Result;
+use calib::raw::{BagRows, Record, RecordFault, RecordReader, Source, source};
+use calib::table::{Intake, Recording, Rejected, from_file};
+use mcap::Compression;
+use std::io::Cursor;
+use std::path::Path;
+use write::{FRAMES, JOINTS, Message, POINT, db3, frames, joint_state, mcap, point};
+
+const ARM: [&str; 6] =
+    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
+const SECOND: i64 = 1_000_000_000;
+/// In November 2023.
+const START: i64 = 1_700_000_000 * SECOND + 123_456_789;
+
+/// Every kind of bag with these messages.
+fn every(messages: &[Message]) -> Vec<Vec<u8>> {
+    let packed = [None, Some(Compression::Lz4), Some(Compression::Zstd)];
+    packed.into_iter().map(|compression| mcap(compression, messages)).chain([db3(messages)]).collect()
+}
+
+type Rows = (Vec<String>, Vec<Vec<String>>, Option<String>);
+
+/// Names, rows and what is lost.
+fn rows_of(bag: Box<dyn Source>, topic: Option<&str>) -> Result<Rows> {
+    let (mut reader, mut record, mut rows) = (BagRows::open(bag, "run.bag", topic)?, Record::default(), Vec::new());
+    reader.next(&mut record)?;
+    let names = record.cells();
+    while reader.next(&mut record)? {
+        assert!(record.fault.is_none(), "{:?}", record.fault);
+        rows.push(record.cells());
+    }
+    Ok((names, rows, reader.loss()))
+}
+
+fn rows(bag: &[u8], topic: Option<&str>) -> Rows {
+    rows_of(Box::new(Cursor::new(bag.to_vec())), topic).unwrap()
+}
+
+fn wave(k: usize, joint: usize) -> f64 {
+    0.3 * joint as f64 + (0.1 * k as f64 + joint as f64).sin()
+}
+
+/// A state every 8 ms of a hand's finger and the arm's joints, which stand in another order each time.
+fn states(is_big: bool, count: usize) -> Vec<Message> {
+    let state = |k: usize| {
+        let order: Vec<usize> = (0..6).map(|j| (j + k) % 6).collect();
+        let names: Vec<&str> = std::iter::once("finger_1").chain(order.iter().map(|j| ARM[*j])).collect();
+        let of = |factor: f64| std::iter::once(9.0).chain(order.iter().map(|j| factor * wave(k, *j))).collect::<Vec<f64>>();
+        let ns = START + 8_000_000 * k as i64;
+        ("/joint_states", JOINTS, ns + 1000, joint_state(is_big, ns, &names, [&of(1.0), &of(2.0), &of(3.0)]))
+    };
+    (0..count).map(state).collect()
+}
+
+#[test]
+fn joints_come_by_their_names_from_every_kind_of_bag_and_both_orders_of_bytes() {
+    for bag in every(&states(false, 300)).into_iter().chain(every(&states(true, 300))) {
+        let (names, rows, loss) = rows(&bag, None);
+        assert_eq!((rows.len(), loss), (300, None));
+        let column = |name: &str| names.iter().position(|other| other == name).unwrap();
+        for (k, row) in rows.iter().enumerate() {
+            for (j, joint) in ARM.iter().enumerate() {
+                for (what, factor) in [("position", 1.0), ("velocity", 2.0), ("effort", 3.0)] {
+                    let read: f64 = row[column(&format!("{joint}.{what}"))].parse().unwrap();
+                    assert_eq!(read.to_bits(), (factor * wave(k, j)).to_bits(), "{joint} {what}");
+                }
+            }
+            assert_eq!(row[column("finger_1.position")], "9.0");
+        }
+        assert_eq!([&rows[0][column("stamp")], &rows[0][column("received")]], ["1700000000.123456789", "1700000000.123457789"]);
+    }
+}
+
+#[test]
+fn transforms_are_read_by_their_frames() {
+    let pose = |k: usize| [k as f64, 0.5, -1.25, 0.0, 0.0, 0.6, 0.8];
+    let messages: Vec<Message> = (0..9)
+        .map(|k| {
+            let ns = START + k as i64 * SECOND;
+            let other = ("map", "base", pose(77));
+            let all = if k % 3 == 0 { vec![other] } else { vec![other, ("base", "tool0", pose(k))] };
+            ("/tf", FRAMES, ns, frames(ns, &all))
+        })
+        .collect();
+    for bag in every(&messages) {
+        let (names, found, _) = rows(&bag, Some("/tf base->tool0"));
+        let x = names.iter().position(|name| name == "translation.x").unwrap();
+        let read: Vec<&str> = found.iter().map(|row| row[x].as_str()).collect();
+        assert_eq!(read, ["1.0", "2.0", "4.0", "5.0", "7.0", "8.0"]);
+        let said = rows_of(Box::new(Cursor::new(bag)), None).unwrap_err().to_string();
+        assert!(said.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"), "{said}");
+    }
+}
+
+#[test]
+fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
+    let mut messages = states(false, 3);
+    messages.push(("/plan", "trajectory_msgs/msg/JointTrajectory", START, vec![0, 1, 0, 0]));
+    for bag in every(&messages) {
+        let refused = |topic: &str| rows_of(Box::new(Cursor::new(bag.clone())), Some(topic)).unwrap_err().to_string();
+        let said = refused("/joint_state");
+        assert!(
+            said.contains("no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`"),
+            "{said}"
+        );
+        let said = refused("/plan");
+        assert!(said.contains("holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"), "{said}");
+    }
+    let said = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None).unwrap_err().to_string();
+    assert!(said.contains("has no topic that is read; none of its topics is read"), "{said}");
+}
+
+#[test]
+fn a_bag_that_is_cut_gives_its_beginning_and_says_that_the_rest_is_lost() {
+    let whole = states(false, 400);
+    for bag in every(&whole) {
+        let (_, all, _) = rows(&bag, None);
+        let mut before = 0;
+        for k in 1..=20 {
+            let cut = bag[..bag.len() * k / 21].to_vec();
+            let Ok((_, found, loss)) = rows_of(Box::new(Cursor::new(cut)), None) else {
+                assert!(k < 5, "nothing is read of {k} parts of 21");
+                continue;
+            };
+            assert!(found.len() >= before && found[..] == all[..found.len()], "{k}");
+            assert!(found.len() * 21 + 21 * 40 >= all.len() * (k - 1), "{k}: {} of {}", found.len(), all.len());
+            let loss = loss.expect("a loss");
+            assert!(loss.contains("lost") && loss.contains("cut"), "{loss}");
+            before = found.len();
+        }
+    }
+}
+
+#[test]
+fn damaged_bytes_never_break_the_reading() {
+    let mut draw = 12345u64;
+    for bag in every(&states(false, 60)) {
+        for _ in 0..150 {
+            let mut bytes = bag.clone();
+            for _ in 0..3 {
+                draw = draw.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                let at = (draw >> 33) as usize % bytes.len();
+                bytes[at] = (draw >> 20) as u8;
+            }
+            let Ok(mut reader) = BagRows::open(Box::new(Cursor::new(bytes)), "run.bag", None) else { continue };
+            let mut record = Record::default();
+            while reader.next(&mut record).unwrap() {}
+            assert!(reader.lines() <= 400, "{}", reader.lines());
+        }
+    }
+}
+
+#[test]
+fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
+    let all = states(false, 120);
+    for kind in ["mcap", "db3"] {
+        let folder = tempfile::tempdir().unwrap();
+        for (part, messages) in all.chunks(10).enumerate() {
+            let bag = if kind == "mcap" { mcap(Some(Compression::Zstd), messages) } else { db3(messages) };
+            // One recorder was stopped by force.
+            let end = if part == 4 { bag.len() / 2 } else { bag.len() };
+            std::fs::write(folder.path().join(format!("run_{part}.{kind}")), &bag[..end]).unwrap();
+        }
+        std::fs::write(folder.path().join("metadata.yaml"), "rosbag2_bagfile_information: {}\n").unwrap();
+        let (names, found, loss) = rows_of(source(folder.path()).unwrap(), None).unwrap();
+        let x = names.iter().position(|name| name == "elbow_joint.position").unwrap();
+        let read: Vec<f64> = found.iter().map(|row| row[x].parse().unwrap()).collect();
+        let expected: Vec<f64> = (0..120).map(|k| wave(k, 2)).collect();
+        assert!(found.len() >= 110 && read[..40] == expected[..40] && read.ends_with(&expected[50..]), "{}", found.len());
+        assert!(loss.is_some_and(|loss| loss.starts_with("part 5: it ")));
+    }
+}
+
+/// A run of a pipeline in a folder: the rows that were used, those that were not, and the counts.
+fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::fs::copy(root.join("pipelines/ur10/robot.yaml"), here.join("robot.yaml")).unwrap();
+    let head =
+        "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
+    std::fs::write(here.join("p.yaml"), format!("{head}{pipeline}")).unwrap();
+    let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let at = |name: &str| here.join("s/tables/p").join(format!("ingest.{name}.parquet"));
+    let recording = from_file(&at("recording")).unwrap().table;
+    (recording, from_file(&at("rejected")).unwrap().table, from_file(&at("intake")).unwrap().table, said)
+}
+
+const POSES: &str = "      files:
+        - file: run.mcap
+          topic: /joint_states
+          columns:
+            time: {column: stamp, unit: s}
+            q: {column: \"{name}.position\", unit: rad}
+        - file: run.mcap
+          topic: /reflector
+          columns:
+            time: {column: stamp, unit: s}
+            x: {column: point.x, unit: m}
+            y: {column: point.y, unit: m}
+            z: {column: point.z, unit: m}
+      join: {by: time, tolerance_s: 0.001}
+      limits: ignore
+      max_rejected_fraction: 0.9
+";
+
+#[test]
+fn each_message_that_is_not_used_has_its_reason() {
+    let joints = |k: i64, q: f64| joint_state(false, START + k * SECOND, &ARM, [&[q; 6], &[], &[]]);
+    let mut messages: Vec<Message> = (0..20).map(|k| ("/joint_states", JOINTS, START, joints(k, 0.01 * k as f64))).collect();
+    let more = [
+        // Another publisher, a gripper.
+        joint_state(false, START + SECOND, &["finger_1", "finger_2"], [&[0.0, 0.0], &[], &[]]),
+        joints(19, 0.2),
+        joints(30, f64::NAN),
+        joint_state(false, START + 31 * SECOND, &ARM, [&[], &[0.0; 6], &[]]),
+        joint_state(false, START + 32 * SECOND, &ARM, [&[0.0; 5], &[], &[]]),
+        joint_state(false, START + 33 * SECOND, &["elbow_joint", "elbow_joint"], [&[0.0; 2], &[], &[]]),
+        joints(34, 0.0)[..60].to_vec(),
+        vec![],
+        // A publisher that does not know the time.
+        joint_state(false, 0, &ARM, [&[0.3; 6], &[], &[]]),
+    ];
+    messages.extend(more.map(|data| ("/joint_states", JOINTS, START, data)));
+    messages.extend((0..20).map(|k| ("/reflector", POINT, START, point(true, START + k * SECOND, [1.0, 0.01 * k as f64, 0.5]))));
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("run.mcap"), mcap(Some(Compression::Lz4), &messages)).unwrap();
+    let (recording, rejected, intake, _) = run(folder.path(), POSES);
+    assert_eq!(recording.rows(), 20);
+    let reasons: Vec<(&str, i64)> = rejected.0.iter().map(|row| (row.reason.as_str(), row.line)).collect();
+    let expected = [
+        ("foreign", 21),
+        ("doubled_stamp", 22),
+        ("not_a_number", 23),
+        ("blank", 24),
+        ("damaged", 25),
+        ("damaged", 26),
+        ("damaged", 27),
+        ("damaged", 28),
+        ("blank", 29),
+    ];
+    assert_eq!(reasons, expected);
+    let of = |k: usize| rejected.0[k].detail.as_str();
+    assert_eq!(of(0), "the message has no `shoulder_pan_joint.position`; its joints: finger_1, finger_2");
+    assert_eq!(of(1), "message 20 has the same stamp, 1700000019.123456789 s");
+    assert_eq!(of(4), "`position` has 5 numbers for 6 names");
+    for row in &intake.0 {
+        assert_eq!(row.accepted + row.rejected, row.read, "{}", row.file);
+    }
+    assert_eq!(intake.0[0].read, 29);
+}
+
+#[test]
+fn init_reads_a_bag_and_its_pipeline_runs() {
+    let mut messages: Vec<Message> = Vec::new();
+    for k in 0..60i64 {
+        let (ns, q) = (START + k * SECOND / 2, std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)));
+        messages.push(("/joint_states", JOINTS, ns, joint_state(false, ns, &ARM, [&q, &[], &[]])));
+        let seen = [0.8 + 0.01 * k as f64, 0.2 * (k as f64).sin(), 0.5];
+        messages.push(("/reflector", POINT, ns, point(false, ns + 1_000_000, seen)));
+    }
+    messages.push(("/image", "sensor_msgs/msg/Image", START, vec![0, 1, 0, 0]));
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bag) in [("run.mcap", mcap(Some(Compression::Zstd), &messages)), ("run.db3", db3(&messages))] {
+        let here = folder.path().join(name.replace('.', "_"));
+        std::fs::create_dir(&here).unwrap();
+        std::fs::write(here.join(name), bag).unwrap();
+        let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{said}");
+        assert!(said.contains("topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"), "{said}");
+        assert!(
+            said.contains("topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s"),
+            "{said}"
+        );
+        let pipeline = std::fs::read_to_string(here.join("pipeline.yaml")).unwrap();
+        for line in [
+            "topic: \"/joint_states\"",
+            "topic: \"/reflector\"",
+            "x: {column: \"point.x\", unit: m}",
+            "join: {by: time, tolerance_s: 0.005}",
+        ] {
+            assert!(pipeline.contains(line), "{line} in\n{pipeline}");
+        }
+        let output = calib(&here, &["run", "pipeline.yaml", "--until", "ingest", "--store", "s"], "");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let recordings = glob::glob(here.join("s/tables/*/ingest.recording.parquet").to_str().unwrap()).unwrap();
+        let recordings: Vec<_> = recordings.flatten().collect();
+        assert_eq!(from_file::<Recording>(&recordings[0]).unwrap().table.rows(), 60);
+    }
+}
+
+#[test]
+fn a_doubled_stamp_is_one_of_the_same_joints() {
+    // Two publishers with one clock: the hand's states are no doubles of the arm's.
+    let hand = |k: i64| joint_state(false, START + k * SECOND, &["finger_1"], [&[0.0], &[], &[]]);
+    let arm = |k: i64| joint_state(false, START + k * SECOND, &ARM, [&[0.1; 6], &[], &[]]);
+    let messages: Vec<Message> =
+        (0..4).flat_map(|k| [hand(k), arm(k)]).map(|data| ("/joint_states", JOINTS, START, data)).collect();
+    let mut reader = BagRows::open(Box::new(Cursor::new(db3(&messages))), "run.bag", None).unwrap();
+    let mut record = Record::default();
+    reader.next(&mut record).unwrap();
+    let elbow = record.cells().iter().position(|name| name == "elbow_joint.position").unwrap();
+    reader.only(&[(elbow, true)]);
+    let mut faults = Vec::new();
+    while reader.next(&mut record).unwrap() {
+        faults.push(record.fault.as_ref().map(|(fault, _)| *fault));
+    }
+    assert_eq!(faults, [Some(RecordFault::Foreign), None].repeat(4));
+}
