@@ -100,7 +100,7 @@ impl ModelArguments {
         if self.robot.is_some() {
             return Err(Error::spec(
                 "--robot",
-                "goes with a table of parameters; a run or a pipeline knows its robot: leave it out",
+                "is of tables of parameters alone; a run or a pipeline knows its robot: leave it out",
             ));
         }
         let (store, step) = (self.means.store()?, self.step.as_deref());

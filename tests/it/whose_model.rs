@@ -259,5 +259,5 @@ stages:
 fn a_run_knows_its_robot() {
     let (code, out, told) = said(cell(), &["compensate", "HEAD", "--robot", "other.yaml"]);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{told}");
-    assert!(told.contains("--robot: goes with a table of parameters; a run or a pipeline knows its robot"), "{told}");
+    assert!(told.contains("--robot: is of tables of parameters alone; a run or a pipeline knows its robot"), "{told}");
 }
