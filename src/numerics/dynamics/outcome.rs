@@ -30,7 +30,7 @@ const LASTING: f64 = 8.0;
 /// All of it.
 pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut remarks: Vec<String>) -> TorqueDiagnosis {
     let problem = &solved.problem;
-    let choice = CauseChoice::new(problem, &solved.weighted, question.seed);
+    let choice = CauseChoice::new(problem, &solved.weighted);
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
