@@ -259,7 +259,7 @@ impl KnownState {
     }
 
     /// The likeliest coefficients (SI) of its components, one component after another.
-    pub fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
+    pub(super) fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
         let left = DVector::from_vec(self.left(components, frame));
         let of = |own: &&Component| {
             let along = own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
@@ -270,7 +270,7 @@ impl KnownState {
     }
 
     /// What its components leave of the residual at their likeliest.
-    pub fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
+    pub(super) fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
         let residual = DVector::from_column_slice(frame.residual());
         let left = self
             .weights()
@@ -332,7 +332,7 @@ impl KnownState {
     }
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
-    pub fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
+    pub(super) fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else { return Vec::new() };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
