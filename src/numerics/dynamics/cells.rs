@@ -5,7 +5,7 @@ use super::cause::TORQUE_CONSTANT;
 use super::choice::CauseChoice;
 use crate::criteria::cells::{COMMON, NU, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, LEAST_NOISE, PER_METRE, USUAL};
-use crate::diagnose::table::{AMPLITUDES, EvidenceRows, KnownState, evidence, log_sum};
+use crate::diagnose::table::{AMPLITUDES, ComponentSearch, EvidenceRows, KnownState, evidence, log_sum};
 use crate::effect::Place;
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
@@ -58,6 +58,37 @@ pub(super) struct TorqueTable<'a, 'b> {
     unit: Vec<f64>,
     /// What the base leaves of the products of components' columns with all others.
     left: RefCell<BTreeMap<usize, Rc<Vec<f64>>>>,
+}
+
+impl ComponentSearch for TorqueTable<'_, '_> {
+    type Component = TorqueComponent;
+
+    fn least(&self) -> f64 {
+        0.5 * *APART
+    }
+
+    fn noise(&self, components: &[TorqueComponent]) -> f64 {
+        self.state(components, None).known.kappa
+    }
+
+    fn odds(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> Option<f64> {
+        let is_free = self.choice.is_whole(&forms(&without(components, place)));
+        is_free.then(|| self.odds_of(components, place, kappa).log_odds)
+    }
+
+    fn best(&mut self, components: &[TorqueComponent]) -> Option<TorqueComponent> {
+        let state = (components.len() < *COMPONENTS).then(|| self.state(components, None))?;
+        let best = self.strongest(0..self.cells.len(), &state)?;
+        (best.log_odds >= self.least()).then_some(best.best)
+    }
+
+    fn with_newest(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        self.backfit(components)
+    }
+
+    fn anew(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        self.backfit(components)
+    }
 }
 
 impl<'a, 'b> TorqueTable<'a, 'b> {
@@ -164,6 +195,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         Some(CellWord { log_odds: own.log_prior + log, best: best.1 })
     }
 
+    /// The cell of some that says most beside a state.
+    fn strongest(&self, cells: impl IntoIterator<Item = usize>, state: &TorqueState) -> Option<CellWord> {
+        let words = cells.into_iter().filter_map(|cell| self.cell(cell, state));
+        words.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
+    }
+
     /// ln of the odds of a component beside the others.
     fn odds_of(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> CellWord {
         let state = self.state(&without(components, place), Some(kappa));
@@ -209,42 +246,6 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
     }
 
-    /// Adds cells while they pay.
-    fn grow(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        while components.len() < *COMPONENTS {
-            let state = self.state(&components, None);
-            let words = (0..self.cells.len()).filter_map(|cell| self.cell(cell, &state));
-            let Some(best) = words.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds)) else { break };
-            if best.log_odds < 0.5 * *APART {
-                break;
-            }
-            components.push(best.best);
-            components = self.backfit(components);
-        }
-        components
-    }
-
-    /// Drops components that no longer pay.
-    fn prune(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        loop {
-            let kappa = self.state(&components, None).known.kappa;
-            let set = forms(&components);
-            let free = |place: &usize| {
-                let mut rest = set.clone();
-                rest.remove(*place);
-                self.choice.is_whole(&rest)
-            };
-            let odds = (0..components.len()).filter(free).map(|place| (place, self.odds_of(&components, place, kappa).log_odds));
-            match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((place, odds)) if odds < 0.5 * *APART => {
-                    components.remove(place);
-                    components = self.backfit(components);
-                }
-                _ => return components,
-            }
-        }
-    }
-
     /// Exchanges components for cells that say more in their place.
     fn swap(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         'rounds: for _ in 0..*EXCHANGES {
@@ -258,8 +259,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                     let form = self.cells[*cell].forms[0];
                     self.choice.compete(form, own)
                 };
-                let words = (0..self.cells.len()).filter(may).filter_map(|cell| self.cell(cell, &state));
-                let Some(best) = words.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds)) else { continue };
+                let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else { continue };
                 let is_same = self.cell_of[&best.best.form] == self.cell_of[&own];
                 let word = if is_same {
                     // Another shape of the same cell: by itself, against the present one.
@@ -310,8 +310,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 (0..components.len()).filter(|place| !group.contains(place)).map(|place| components[place]).collect();
             let state = self.state(&rest, None);
             let cells = (0..self.cells.len()).filter(|cell| may(self.cells[*cell].forms[0]));
-            let one = cells.filter_map(|cell| self.cell(cell, &state)).max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
-            let Some(one) = one else { continue };
+            let Some(one) = self.strongest(cells, &state) else { continue };
             let next = self.backfit(rest.into_iter().chain([one.best]).collect());
             let total = self.total(&next);
             if total > best.0 {
@@ -327,15 +326,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
     }
 
     /// The best components that steps from a start lead to.
-    fn searched(&self, start: &[usize]) -> Vec<TorqueComponent> {
-        let components = self.grow(self.components(start));
+    fn searched(&mut self, start: &[usize]) -> Vec<TorqueComponent> {
+        let components = self.add(self.components(start));
         let components = self.settled(components);
-        self.prune(self.grow(components))
+        let components = self.add(components);
+        self.prune(components)
     }
 
     /// Exchanges, merges and removals.
-    fn settled(&self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
-        let components = self.merge(self.swap(self.prune(components)));
+    fn settled(&mut self, components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
+        let components = self.prune(components);
+        let components = self.merge(self.swap(components));
         self.prune(components)
     }
 
@@ -382,7 +383,7 @@ impl OtherInertials {
 /// The best set from what hardly an arm is without, and what stands in place of its wrong masses or drives. One factor on the whole torque of
 /// each joint is asked before masses: where factors explain as much, it is these.
 pub(super) fn from_common(choice: &CauseChoice) -> (Vec<usize>, Option<OtherInertials>) {
-    let table = TorqueTable::new(choice);
+    let mut table = TorqueTable::new(choice);
     let is_drive = |number: &usize| choice.form(*number).cause.name() == TORQUE_CONSTANT;
     let inertial = |set: &[TorqueComponent]| -> Vec<usize> {
         forms(set).into_iter().filter(|number| choice.form(*number).cause.about().inertial).collect()
@@ -410,8 +411,9 @@ pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
 
 /// A set brought to rest: exchanges, merges and removals.
 pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
-    let table = TorqueTable::new(choice);
-    forms(&table.settled(table.components(set)))
+    let mut table = TorqueTable::new(choice);
+    let components = table.components(set);
+    forms(&table.settled(components))
 }
 
 fn forms(components: &[TorqueComponent]) -> Vec<usize> {

@@ -42,7 +42,6 @@ mod latency;
 mod masses;
 mod model;
 mod modelled;
-mod nameless;
 mod naming;
 mod newton_euler;
 mod noise;
