@@ -1,15 +1,12 @@
-//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding.
+//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding. Evidence is of the fitted rows; a
+//! motion that comes later shows what a law is worth beyond them. Where held-out rows hardly show a finding, nothing is asked.
 
 use super::choice::CauseChoice;
 use super::naming::JudgedSet;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::Weighing;
-
-/// What each column of a finding must gain.
-const GAIN: f64 = 3.0;
-/// Standard deviations below the gain that the finding itself foretells: where held-out rows hardly show it, nothing is asked.
-const DEVIATIONS: f64 = 2.0;
+use crate::criteria::torque::{CONFIRMED, NAMED};
 
 /// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
 fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &SweptColumns) -> (Vec<f64>, f64) {
@@ -30,8 +27,8 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
         let gain = pairs().map(|(without, with)| without * without - with * with).sum::<f64>() + rest_stretched - stretched;
         let foretold = pairs().map(|(without, with)| (without - with).powi(2)).sum::<f64>() + rest_stretched - stretched;
         // The gain of a right finding scatters about its own square by twice its root.
-        let least = foretold - DEVIATIONS * 2.0 * foretold.max(0.0).sqrt();
-        (gain, least.min(GAIN * choice.form(set[place]).width as f64))
+        let least = foretold - *NAMED * 2.0 * foretold.max(0.0).sqrt();
+        (gain, least.min(*CONFIRMED * choice.form(set[place]).width as f64))
     };
     (0..set.len()).map(without).collect()
 }
