@@ -71,6 +71,13 @@ impl<'a> CauseChoice<'a> {
         (0..self.open).filter(common).collect()
     }
 
+    /// The next form of the same cause and place with fewer numbers.
+    pub fn plainer(&self, form: &TorqueForm) -> Option<&TorqueForm> {
+        let listed = self.problem.all.forms[..self.open].iter();
+        let plainer = listed.filter(|other| other.is_called_as(form) && other.with == form.with && other.width < form.width);
+        plainer.max_by_key(|other| other.width)
+    }
+
     /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
     pub fn compete(&self, a: usize, b: usize) -> bool {
         let (a, b) = (self.form(a), self.form(b));
