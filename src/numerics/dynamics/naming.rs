@@ -115,7 +115,9 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let (place, sure) = weak.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let form = choice.form(set[place]);
     // Numbers of many waves are uncertain one by one where few of them are not.
-    if let Some(plainer) = choice.plainer(form).filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64) {
+    if let Some(plainer) =
+        choice.plainer(form).filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64)
+    {
         return Some(NotNamed::Within(place, plainer.clone()));
     }
     let mut leaning = (0..set.len()).filter(|other| choice.form(set[*other]).modifies(form));
