@@ -109,7 +109,7 @@ writes! {
 impl Stage for DiagnoseTorques {
     const NAME: &'static str = "diagnose_torques";
     const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
-    const IMPLEMENTATION: u32 = 10;
+    const IMPLEMENTATION: u32 = 11;
     type Reads = DiagnoseTorquesReads;
     type Writes = DiagnoseTorquesWrites;
 
@@ -154,13 +154,8 @@ impl Stage for DiagnoseTorques {
             let message = "`enforce` needs declared masses, and the robot file lacks some: base parameters stand for many arms";
             return Err(Error::data("with.consistency", message));
         }
-        let question = TorqueQuestion {
-            free_inertials: free,
-            cutoff: self.cutoff_hz,
-            without: self.without.clone(),
-            enforce_bodies,
-            seed: context.seed,
-        };
+        let question =
+            TorqueQuestion { free_inertials: free, cutoff: self.cutoff_hz, without: self.without.clone(), enforce_bodies };
         let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
         diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
         let sequence = sequences(&reads.motion, &diagnosis.courses.row)?;

@@ -18,7 +18,7 @@ mod regression;
 mod round;
 mod separate;
 mod setup;
-mod table;
+pub(crate) mod table;
 mod too_few;
 mod types;
 mod unasked;

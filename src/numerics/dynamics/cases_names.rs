@@ -67,6 +67,20 @@ fn wrong_torque_constants_of_three_joints_are_these_and_no_masses() {
 }
 
 #[test]
+fn a_gas_spring_is_a_balancer_though_its_waves_are_uncertain_one_by_one() {
+    // Where the joint moves little, two waves and a constant are hardly three curves.
+    let spring = |angle: f64| {
+        let bend = libm::sin(angle + 1.1);
+        -60.0 * bend * (1.0 + 0.3 * bend)
+    };
+    let recording = record(&arm(), 0.0, &|(joint, _, angle, velocity, ..)| {
+        4.0 * velocity + 5.0 * (velocity / 0.003).tanh() + if joint == 1 { spring(angle) } else { 0.0 }
+    });
+    let all = found(&diagnosed(&recording));
+    assert!(all.contains(&"spring_balance joint 2".to_string()), "{all:?}");
+}
+
+#[test]
 fn torques_that_come_later_than_is_looked_for_get_no_latency() {
     let late = |seconds: f64| {
         let diagnosis = diagnosed(&record(&arm(), seconds, &|row| 5.0 * (row.3 / 0.003).tanh()));

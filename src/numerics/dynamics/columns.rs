@@ -103,12 +103,9 @@ impl TorqueColumns {
         }
     }
 
-    /// Columns of the listed forms, and of those of a set, that are made of the sign of a velocity, anew.
-    pub fn renew_signs(&mut self, set: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
-        let used = |number: &usize| *number < self.listed || set.contains(number);
-        for number in
-            (0..self.forms.len()).filter(used).filter(|number| self.forms[*number].cause.about().of_sign).collect::<Vec<_>>()
-        {
+    /// Columns of some forms that are made of the sign of a velocity, anew.
+    pub fn renew_signs(&mut self, forms: &[usize], scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
+        for number in forms.iter().copied().filter(|number| self.forms[*number].cause.about().of_sign).collect::<Vec<_>>() {
             let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
             let range = self.of(number);
             self.columns[range].clone_from_slice(&fresh);
@@ -120,6 +117,17 @@ impl TorqueColumns {
         self.columns.push(column);
         self.prior.resize(self.columns.len(), 0.0);
         self.columns.len() - 1
+    }
+
+    /// Rms of a column over half the range of the torque, over the joints that it acts on.
+    pub fn size(&self, column: usize) -> f64 {
+        let own = &self.columns[column];
+        let of = |(joint, course): (&usize, &Vec<f64>)| {
+            let range = self.torque.get(*joint).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            course.iter().map(|value| (value / range).powi(2)).sum::<f64>() / course.len().max(1) as f64
+        };
+        let squares = own.joints.iter().zip(&own.courses).map(of);
+        (squares.sum::<f64>() / own.joints.len().max(1) as f64).sqrt()
     }
 
     /// Columns of a form.

@@ -1,22 +1,20 @@
 //! What was found in words and numbers: sizes, evidence, rivals, probabilities.
 
 use super::cause::{FittedNumber, TorqueForm};
+use super::cells::{CellOdds, OtherInertials, TorqueTable};
 use super::choice::CauseChoice;
-use super::drives::OtherInertials;
 use super::friction_line::number_of_line;
-use super::judge::JudgedSet;
+use super::naming::JudgedSet;
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueFinding, TorqueParameter};
+use crate::criteria::cells::{MISLED, RIVAL};
+use crate::diagnose::table::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
 
-/// A rival whose criterion is worse by more is none.
-const FARTHEST: f64 = 14.0;
-/// True shapes differ a little from those of the library: differences of the criterion count for less than their exponent.
-const TEMPERATURE: f64 = 2.0;
 /// Residual rows of a test, at most: beyond it the tail does not change.
 const FREEDOM: f64 = 1e4;
 
@@ -31,8 +29,16 @@ pub(super) fn findings(
     let sweep = choice.base.with(set);
     let solution = sweep.solution();
     let named = set.iter().filter(|number| silent.iter().all(|one| !choice.form(*one).is_called_as(choice.form(**number))));
-    let mut found: Vec<TorqueFinding> =
-        named.map(|number| finding(choice, set, (&sweep, &solution), *number, held_out, uncertain, other)).collect();
+    let table = TorqueTable::new(choice);
+    let components = table.components(set);
+    let mut found: Vec<TorqueFinding> = named
+        .map(|number| {
+            let mut odds = table.odds_in_place(&components, *number);
+            let other = other.filter(|_| choice.form(*number).cause.about().inertial);
+            odds.rivals.extend(other.into_iter().flat_map(|other| other.rivals(choice, odds.own)));
+            weighed(finding(choice, set, (&sweep, &solution), *number, held_out, uncertain), odds)
+        })
+        .collect();
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     found
 }
@@ -44,7 +50,6 @@ fn finding(
     number: usize,
     held_out: &[usize],
     (uncertain, slopes): (&SweptColumns, &ShapeSlopes),
-    other: Option<&OtherInertials>,
 ) -> TorqueFinding {
     let (problem, form) = (choice.problem, choice.form(number));
     let line = number_of_line(choice, set, number, solution, (uncertain, slopes));
@@ -64,7 +69,7 @@ fn finding(
         true => solution.iter().copied().filter(|(column, _)| !problem.all.of(number).contains(column)).collect(),
         false => without.solution(),
     };
-    let mut finding = TorqueFinding {
+    TorqueFinding {
         effect: form.cause.name(),
         place: form.place,
         statement: form.cause.statement(form, &fitted),
@@ -77,27 +82,26 @@ fn finding(
             heldout_gain: (!held_out.is_empty()).then(|| held_out_gain(problem, &left_without, solution, held_out)),
             effect_rms: (square / count as f64).sqrt(),
         },
-        rivals: rivals(choice, &rest, &without, number, loss.square),
+        rivals: Vec::new(),
         probabilities: Probabilities::default(),
-    };
-    if let Some(other) = other.filter(|_| form.cause.about().inertial) {
-        in_place(choice, other, &mut finding);
     }
-    weigh(&mut finding, loss.square - choice.penalty(number, loss.rank.max(1)));
-    finding
 }
 
-/// Adds wrong masses or drives that together stand in place of those of the set: they share what one of them would have.
-fn in_place(choice: &CauseChoice, other: &OtherInertials, finding: &mut TorqueFinding) {
-    let shared = other.worse + 2.0 * TEMPERATURE * (other.forms.len() as f64).ln();
-    for form in other.forms.iter().map(|number| choice.form(*number)).filter(|_| shared <= FARTHEST) {
-        let (effect, place) = (form.cause.name(), form.place);
-        let is_own = effect == finding.effect && place == finding.place;
-        if !is_own && finding.rivals.iter().all(|rival| (rival.effect, rival.place) != (effect, place)) {
-            finding.rivals.push(RivalCause { effect, place, delta_bic: shared, probability: 0.0 });
+/// A finding with its probabilities: those of its name, of all that could stand in its place, and of nothing.
+fn weighed(mut finding: TorqueFinding, CellOdds { own, rivals }: CellOdds) -> TorqueFinding {
+    let whole = log_sum(&rivals.iter().map(|(_, log)| *log).chain([own, 0.0]).collect::<Vec<_>>());
+    let share = |log: f64| (1.0 - *MISLED) * (log - whole).exp();
+    let mut here = share(own);
+    for ((effect, place), log) in rivals {
+        let probability = share(log);
+        here += if place == finding.place { probability } else { 0.0 };
+        if (effect, place) != (finding.effect, finding.place) && probability > *RIVAL {
+            finding.rivals.push(RivalCause { effect, place, delta_bic: 2.0 * (own - log), probability });
         }
     }
-    finding.rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+    finding.rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    finding.probabilities = Probabilities { name: share(own), place: here, none: share(0.0) + *MISLED };
+    finding
 }
 
 /// Parameters with the standard deviations of shape numbers.
@@ -129,41 +133,6 @@ fn held_out_gain(problem: &TorqueProblem, without: &[(usize, f64)], solution: &[
     rms(&problem.residual(without)) - rms(&problem.residual(solution))
 }
 
-/// Other names or places that explain nearly as much, the best form of each; closest first.
-fn rivals(choice: &CauseChoice, rest: &[usize], without: &SweptColumns, number: usize, gain: f64) -> Vec<RivalCause> {
-    let own = gain - choice.penalty(number, choice.form(number).width);
-    let mut rivals: Vec<RivalCause> = Vec::new();
-    let others = (0..choice.open).filter(|other| choice.compete(*other, number) && choice.may_join(*other, rest));
-    for other in others.filter(|other| !choice.form(*other).is_called_as(choice.form(number))) {
-        let form = choice.form(other);
-        let delta_bic = own - choice.worth(without, other);
-        if delta_bic > FARTHEST {
-            continue;
-        }
-        let rival = RivalCause { effect: form.cause.name(), place: form.place, delta_bic, probability: 0.0 };
-        match rivals.iter_mut().find(|known| known.effect == rival.effect && known.place == rival.place) {
-            Some(known) => known.delta_bic = known.delta_bic.min(delta_bic),
-            None => rivals.push(rival),
-        }
-    }
-    rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-    rivals
-}
-
-/// Shares what is not nothing at all among the name and its rivals.
-fn weigh(finding: &mut TorqueFinding, worth: f64) {
-    let weight = |delta: f64| (-delta.max(0.0) / (2.0 * TEMPERATURE)).exp();
-    let none = 0.5 * weight(worth.max(0.0)) + 0.01;
-    let whole = 1.0 + finding.rivals.iter().map(|rival| weight(rival.delta_bic)).sum::<f64>();
-    let mut here = 1.0;
-    for rival in &mut finding.rivals {
-        let share = weight(rival.delta_bic);
-        rival.probability = (1.0 - none) * share / whole;
-        here += if rival.place == finding.place { share } else { 0.0 };
-    }
-    finding.probabilities = Probabilities { name: (1.0 - none) / whole, place: (1.0 - none) * here / whole, none };
-}
-
 /// A finding that has no rivals in the pool: a latency, a contact.
 pub(super) fn plain_finding(
     effect: &'static str,
@@ -173,7 +142,7 @@ pub(super) fn plain_finding(
     gain: f64,
     columns: f64,
 ) -> TorqueFinding {
-    let mut finding = TorqueFinding {
+    let finding = TorqueFinding {
         effect,
         place,
         statement,
@@ -189,8 +158,7 @@ pub(super) fn plain_finding(
         rivals: Vec::new(),
         probabilities: Probabilities::default(),
     };
-    weigh(&mut finding, gain);
-    finding
+    weighed(finding, CellOdds { own: 0.5 * gain, rivals: Vec::new() })
 }
 
 /// A push on the arm.

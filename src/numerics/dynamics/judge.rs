@@ -1,24 +1,12 @@
-//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding.
+//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding. Evidence is of the fitted rows; a
+//! motion that comes later shows what a law is worth beyond them. Where held-out rows hardly show a finding, nothing is asked.
 
-use super::cause::TorqueForm;
 use super::choice::CauseChoice;
+use super::naming::JudgedSet;
 use super::problem::TorqueProblem;
 use super::sweep::SweptColumns;
 use super::weighted::Weighing;
-
-/// What each column of a finding must gain.
-const GAIN: f64 = 3.0;
-/// Standard deviations below the gain that the finding itself foretells: where held-out rows hardly show it, nothing is asked.
-const DEVIATIONS: f64 = 2.0;
-
-/// A set that held-out rows have confirmed, and what they did not.
-pub(super) struct JudgedSet {
-    pub set: Vec<usize>,
-    /// What of the set is part of the model, but too little to be named.
-    pub silent: Vec<usize>,
-    /// With what held-out rows gained by each.
-    pub withdrawn: Vec<(usize, f64)>,
-}
+use crate::criteria::torque::{CONFIRMED, NAMED};
 
 /// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
 fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &SweptColumns) -> (Vec<f64>, f64) {
@@ -39,8 +27,8 @@ fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
         let gain = pairs().map(|(without, with)| without * without - with * with).sum::<f64>() + rest_stretched - stretched;
         let foretold = pairs().map(|(without, with)| (without - with).powi(2)).sum::<f64>() + rest_stretched - stretched;
         // The gain of a right finding scatters about its own square by twice its root.
-        let least = foretold - DEVIATIONS * 2.0 * foretold.max(0.0).sqrt();
-        (gain, least.min(GAIN * choice.form(set[place]).width as f64))
+        let least = foretold - *NAMED * 2.0 * foretold.max(0.0).sqrt();
+        (gain, least.min(*CONFIRMED * choice.form(set[place]).width as f64))
     };
     (0..set.len()).map(without).collect()
 }
@@ -52,25 +40,15 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         return JudgedSet { set, silent: Vec::new(), withdrawn };
     }
     loop {
-        let solution = choice.base.with(&set).solution();
-        if let Some(place) = set.iter().position(|number| choice.is_impossible(*number, &solution)) {
-            set.remove(place);
-            continue;
-        }
         let gains = gains(choice, &set);
         let short = |place: &usize| gains[*place].0 - gains[*place].1;
         let needed = |place: &usize| {
             let form = choice.form(set[*place]);
-            set.iter().any(|other| modifies(choice.form(*other), form))
+            set.iter().any(|other| choice.form(*other).modifies(form))
         };
         let worst = (0..set.len()).filter(|place| short(place) < 0.0 && !needed(place));
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
         withdrawn.push((set.remove(worst), gains[worst].0));
     }
     JudgedSet { set, silent: Vec::new(), withdrawn }
-}
-
-/// Whether one form modifies the friction that another is.
-pub(super) fn modifies(form: &TorqueForm, friction: &TorqueForm) -> bool {
-    form.place == friction.place && form.cause.about().modifies.contains(&friction.cause.name())
 }

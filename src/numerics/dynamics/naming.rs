@@ -4,7 +4,6 @@
 use super::cause::{TorqueForm, UNKNOWN};
 use super::choice::CauseChoice;
 use super::friction_line::number_of_line;
-use super::judge::{JudgedSet, modifies};
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::shape_slopes::ShapeSlopes;
@@ -13,6 +12,15 @@ use crate::criteria::torque::NAMED;
 
 /// Forms that lose their name one after the other, at most.
 const ROUNDS: usize = 40;
+
+/// What explains a recording.
+pub(super) struct JudgedSet {
+    pub set: Vec<usize>,
+    /// What of the set is part of the model, but too little to be named.
+    pub silent: Vec<usize>,
+    /// What held-out rows did not confirm, with what they gained by each.
+    pub withdrawn: Vec<(usize, f64)>,
+}
 
 /// What becomes of a form.
 enum NotNamed {
@@ -52,18 +60,13 @@ fn at_end(problem: &TorqueProblem, set: &[usize]) -> Option<NotNamed> {
     })
 }
 
-/// Takes names off until all that are left are right; the slopes of what is left.
-pub(super) fn settle_names(
-    problem: &mut TorqueProblem,
-    weighted: &mut WeightedColumns,
-    judged: &mut JudgedSet,
-    seed: u64,
-) -> ShapeSlopes {
+/// Takes names off until all that are left are right.
+pub(super) fn settle_names(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, judged: &mut JudgedSet) {
     for _ in 0..ROUNDS {
         let slopes = ShapeSlopes::of(problem, weighted, &judged.set);
-        let next = at_end(problem, &judged.set).or_else(|| next(&CauseChoice::new(problem, weighted, seed), judged, &slopes));
+        let next = at_end(problem, &judged.set).or_else(|| next(&CauseChoice::new(problem, weighted), judged, &slopes));
         match next {
-            None => return slopes,
+            None => return,
             Some(NotNamed::Silent(place)) => {
                 judged.silent.push(judged.set[place]);
                 continue;
@@ -73,7 +76,6 @@ pub(super) fn settle_names(
         }
         polish(problem, weighted, &mut judged.set);
     }
-    ShapeSlopes::of(problem, weighted, &judged.set)
 }
 
 /// A form as a number of the problem.
@@ -112,8 +114,14 @@ fn next(choice: &CauseChoice, judged: &JudgedSet, slopes: &ShapeSlopes) -> Optio
     let weak = weak.filter(|(place, sure)| sure.abs() < *NAMED || wrong(*place, *sure));
     let (place, sure) = weak.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let form = choice.form(set[place]);
-    let mut leaning = (0..set.len()).filter(|other| modifies(choice.form(set[*other]), form));
-    let is_summed = choice.is_part_of_curve(form, |other| set.contains(&other));
+    // Numbers of many waves are uncertain one by one where few of them are not.
+    if let Some(plainer) =
+        choice.plainer(form).filter(|_| sweep.loss(set[place], &solution).square > NAMED.powi(2) * form.width as f64)
+    {
+        return Some(NotNamed::Within(place, plainer.clone()));
+    }
+    let mut leaning = (0..set.len()).filter(|other| choice.form(set[*other]).modifies(form));
+    let is_summed = choice.is_part_of_curve(form, set);
     if is_summed || (form.cause.about().brakes && sure > 0.0) {
         return Some(NotNamed::Silent(place));
     }

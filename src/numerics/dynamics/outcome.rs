@@ -1,13 +1,11 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
 use super::bodies::with_bodies;
-use super::cause::UNKNOWN;
 use super::choice::CauseChoice;
 use super::errors::{errors, rests};
 use super::findings::{contact, findings, plain_finding};
 use super::inertial_names::{INERTIAL_NAMES, inertial_unit};
 use super::model::TorqueModel;
-use super::nameless::{absorb, absorb_drag, unconfirmed, unname};
 use super::newton_euler::INERTIAL_NUMBERS;
 use super::noise::JointNoise;
 use super::problem::TorqueProblem;
@@ -30,7 +28,7 @@ const LASTING: f64 = 8.0;
 /// All of it.
 pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut remarks: Vec<String>) -> TorqueDiagnosis {
     let problem = &solved.problem;
-    let choice = CauseChoice::new(problem, &solved.weighted, question.seed);
+    let choice = CauseChoice::new(problem, &solved.weighted);
     let set = &solved.judged.set;
     let sweep = choice.base.with(set);
     let free = sweep.solution();
@@ -48,15 +46,8 @@ pub(super) fn outcome(solved: &SolvedTorques, question: &TorqueQuestion, mut rem
         remarks.push(said_of_bodies(enforced, &errors(problem, &problem.residual(&free), &judging), &after));
     }
     let mut found = findings(&choice, &solved.judged, &held, (&uncertain, &solved.slopes), solved.other.as_ref());
-    absorb(&choice, set, &free, &mut found);
-    absorb_drag(&choice, set, &uncertain, &mut found);
     found.extend(problem.events.iter().map(contact));
     found.extend(solved.latency.as_ref().map(late));
-    unname(&choice, &last, &mut found);
-    let named = |place: Place| found.iter().any(|known| known.effect == UNKNOWN && known.place == place);
-    let unconfirmed: Vec<TorqueFinding> =
-        unconfirmed(&choice, &solved.judged.withdrawn, &last).into_iter().filter(|one| !named(one.place)).collect();
-    found.extend(unconfirmed);
     found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
     let leftover = leftover(problem, &last);
     let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);

@@ -47,14 +47,14 @@ fn step(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [
         }
     }
     problem.renew_signs(set);
-    *weighted = problem.weighted();
+    *weighted = problem.weighted_of(set);
     if SweptColumns::base(&problem.all, weighted).with(set).square < square - BETTER {
         return true;
     }
     set.copy_from_slice(&before);
     problem.scene.sign_width = width;
     problem.renew_signs(set);
-    *weighted = problem.weighted();
+    *weighted = problem.weighted_of(set);
     false
 }
 

@@ -40,6 +40,8 @@ pub(super) struct TorqueProblem<'a> {
     pub noise: Vec<JointNoise>,
     /// Causes, with their places, of which only a number at an end of its search would explain the torques.
     pub barred: Vec<(&'static str, Place)>,
+    /// Whether the width of a sign has changed since columns of forms beside a set were made.
+    is_stale: bool,
     /// Least and greatest, C, where it was recorded.
     pub temperature: Option<[f64; 2]>,
 }
@@ -74,6 +76,7 @@ impl<'a> TorqueProblem<'a> {
             events: Vec::new(),
             noise: Vec::new(),
             barred: Vec::new(),
+            is_stale: false,
             temperature: recording.temperature.as_deref().and_then(ends),
         };
         problem.shift(0.0);
@@ -95,9 +98,18 @@ impl<'a> TorqueProblem<'a> {
         self.all.push(form, &self.scene, &self.reduction, &self.regressor)
     }
 
-    /// Makes columns of the sign of a velocity anew, after its width has changed.
+    /// Makes columns of a set of the sign of a velocity anew, after its width has changed; those of others wait.
     pub fn renew_signs(&mut self, set: &[usize]) {
         self.all.renew_signs(set, &self.scene, &self.reduction, &self.regressor);
+        self.is_stale = true;
+    }
+
+    /// Makes the columns that wait anew.
+    pub fn refresh(&mut self) {
+        if std::mem::take(&mut self.is_stale) {
+            let listed: Vec<usize> = (0..self.all.listed).collect();
+            self.all.renew_signs(&listed, &self.scene, &self.reduction, &self.regressor);
+        }
     }
 
     /// Columns of a form that is not taken.
@@ -227,9 +239,18 @@ impl<'a> TorqueProblem<'a> {
         runs
     }
 
-    /// Inner products of fitted rows under the present noise.
-    pub fn weighted(&self) -> WeightedColumns {
-        let chosen: Vec<usize> = (0..self.all.columns.len()).collect();
+    /// Inner products of fitted rows under the present noise: of the base, all that causes list, and a set.
+    pub fn weighted(&mut self, set: &[usize]) -> WeightedColumns {
+        self.refresh();
+        let listed = 0..self.all.listed;
+        let forms: Vec<usize> = listed.clone().chain(set.iter().copied().filter(|form| !listed.contains(form))).collect();
+        self.weighted_of(&forms)
+    }
+
+    /// The same of the base and some forms.
+    pub fn weighted_of(&self, forms: &[usize]) -> WeightedColumns {
+        let mut chosen: Vec<usize> = (0..self.all.base).chain(forms.iter().flat_map(|form| self.all.of(*form))).collect();
+        chosen.sort_unstable();
         WeightedColumns::new(&self.all, &self.measured, self.weighing(&self.runs(false)), &chosen)
     }
 

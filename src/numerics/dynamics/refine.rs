@@ -67,7 +67,7 @@ fn try_grid(
     }
     let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
     let sweep = SweptColumns::base(&problem.all, weighted).with(&rest);
-    let gain = |number: usize| sweep.gain(number).square;
+    let gain = |number: usize| sweep.gain(number);
     let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
     let asked = if is_usual { UNUSUAL + (weighted.rows as f64).ln() } else { BETTER };
     if gain(best) > gain(set[place]) + asked {

@@ -1,31 +1,26 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::choice::{CauseChoice, backward, clear, other_friction};
+use super::cells::{OtherInertials, from_common, search, settle};
+use super::choice::CauseChoice;
 use super::clock::RecordingClock;
 use super::contact::{ContactModel, contacts};
-use super::drives::{OtherInertials, from_common};
 use super::friction_lead::take_friction_lead;
-use super::judge::{JudgedSet, judge};
+use super::judge::judge;
 use super::latency::{Latency, latency};
-use super::leftover::lasting_form;
-use super::naming::{settle_names, take_out_ends};
+use super::naming::{JudgedSet, settle_names, take_out_ends};
 use super::polish::polish;
 use super::problem::TorqueProblem;
 use super::recording::TorqueRecording;
 use super::refine::refine;
-use super::rejudge::rejudge;
 use super::rich::{noise_beside, rich_forms};
-use super::search::{search, settle};
 use super::shape_slopes::ShapeSlopes;
 use super::sign_width::sign_width;
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::WeightedColumns;
 
-/// Rounds in which forms without a name are looked for, and others in place of those with a number at an end of its search, at most.
-const NAMELESS: usize = 4;
-/// Rounds in which others are looked for in place of forms that the polish brought to an end of their search, at most.
+/// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
 /// s.
 const SAME_TIME: f64 = 0.1;
@@ -68,59 +63,48 @@ pub(super) fn solve<'a>(
         problem.events = contacts(&problem, &residual, &noise, ContactModel::Rich);
     }
     learn(&mut problem, &[]);
-    let mut weighted = problem.weighted();
-    let (mut set, mut other) = from_common(&CauseChoice::new(&problem, &weighted, question.seed));
+    let mut weighted = problem.weighted(&[]);
+    let (mut set, mut other) = from_common(&CauseChoice::new(&problem, &weighted));
     let before = problem.events.clone();
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
     }
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
-        weighted = problem.weighted();
-        (set, other) = from_common(&CauseChoice::new(&problem, &weighted, question.seed));
+        weighted = problem.weighted(&[]);
+        (set, other) = from_common(&CauseChoice::new(&problem, &weighted));
     }
     tell(told(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
-    for _ in 0..NAMELESS {
-        set = again(&mut problem, &mut weighted, set, question.seed);
-        let ended = take_out_ends(&mut problem, &mut weighted, &mut set);
-        let lasting = lasting_form(&CauseChoice::new(&problem, &weighted, question.seed), &set);
-        if lasting.is_none() && !ended {
-            break;
-        }
-        set.extend(lasting);
-        tell(told(&problem, &set));
-    }
+    set = again(&mut problem, &mut weighted, set);
     if touched {
         look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
     }
     learn(&mut problem, &set);
-    weighted = problem.weighted();
+    weighted = problem.weighted_of(&set);
     polish(&mut problem, &mut weighted, &mut set);
-    if rejudge(&mut problem, &mut weighted, &mut set, question.seed) {
-        learn(&mut problem, &set);
-        weighted = problem.weighted();
-    }
     for _ in 0..END_ROUNDS {
         if !take_out_ends(&mut problem, &mut weighted, &mut set) {
             break;
         }
-        set = again(&mut problem, &mut weighted, set, question.seed);
+        set = again(&mut problem, &mut weighted, set);
         polish(&mut problem, &mut weighted, &mut set);
     }
+    weighted = problem.weighted(&set);
     let mut judged = {
-        let choice = CauseChoice::new(&problem, &weighted, question.seed);
-        settle(&choice, &mut set);
-        let mut judged = judge(&choice, set);
+        let choice = CauseChoice::new(&problem, &weighted);
+        let mut judged = judge(&choice, settle(&choice, &set));
         // What only stood for something that was withdrawn.
-        backward(&choice, &mut judged.set);
-        clear(&choice, &mut judged.set);
-        judged.silent = other_friction(&choice, &judged.set);
+        judged.set = settle(&choice, &judged.set);
+        judged.silent = choice.other_friction(&judged.set);
         judged.set.extend(&judged.silent);
         judged
     };
+    weighted = problem.weighted_of(&judged.set);
     polish(&mut problem, &mut weighted, &mut judged.set);
-    let slopes = settle_names(&mut problem, &mut weighted, &mut judged, question.seed);
+    settle_names(&mut problem, &mut weighted, &mut judged);
+    weighted = problem.weighted(&judged.set);
+    let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &judged.set);
     SolvedTorques { problem, weighted, judged, slopes, latency: found, other }
 }
 
@@ -152,17 +136,18 @@ fn alike(before: &[ContactEvent], after: &[ContactEvent]) -> bool {
 }
 
 /// From the fitted rigid torque and noise: searches on from a set and refines it.
-fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<usize>, seed: u64) -> Vec<usize> {
+fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<usize>) -> Vec<usize> {
     let theta = {
-        let sweep = CauseChoice::new(problem, weighted, seed).base.with(&set);
+        let sweep = CauseChoice::new(problem, weighted).base.with(&set);
         problem.inertials(&set, &sweep.solution())
     };
     problem.believe(&theta, &set);
+    problem.refresh();
     learn(problem, &set);
-    *weighted = problem.weighted();
-    let mut set = search(&CauseChoice::new(problem, weighted, seed), set);
+    *weighted = problem.weighted(&set);
+    let mut set = search(&CauseChoice::new(problem, weighted), &set);
     if refine(problem, weighted, &mut set) {
-        backward(&CauseChoice::new(problem, weighted, seed), &mut set);
+        set = settle(&CauseChoice::new(problem, weighted), &set);
     }
     set
 }

@@ -52,7 +52,7 @@ pub(super) struct StackedFit {
 impl StackedNormal {
     /// Stacks both problems, whose columns are alike.
     pub fn new(problems: &[TorqueProblem; 2], candidates: &[CandidateColumns]) -> Self {
-        let weighted = problems.each_ref().map(|problem| problem.weighted());
+        let weighted = problems.each_ref().map(|problem| problem.weighted_of(&(0..problem.all.forms.len()).collect::<Vec<_>>()));
         let base = problems[0].all.base;
         let shared = candidates.iter().filter(|one| one.shared).map(|one| one.columns.end).max().unwrap_or(base);
         let payload = payload_columns(&problems[1]);

@@ -94,58 +94,46 @@ impl<'a> SweptColumns<'a> {
     }
 
     /// What a form would gain, given the present ones.
-    pub fn gain(&self, form: usize) -> Gain {
-        self.gain_of(form, &self.right)
+    pub fn gain(&self, form: usize) -> f64 {
+        let (gram, right) = self.left_among(form);
+        let first = self.all.of(form).start;
+        let scale: Vec<f64> =
+            (0..right.len()).map(|a| self.weighted.gram[first + a][first + a].max(f64::MIN_POSITIVE).sqrt()).collect();
+        let mut block = DMatrix::from_fn(right.len(), right.len(), |a, b| gram[(a, b)] / (scale[a] * scale[b]));
+        (0..right.len()).for_each(|a| block[(a, a)] += INVISIBLE + self.prior(first + a) / (scale[a] * scale[a]));
+        let along = DVector::from_fn(right.len(), |a, _| right[a] / scale[a]);
+        block.cholesky().map_or(0.0, |factor| along.dot(&factor.solve(&along)))
+    }
+
+    /// What the present ones leave of the inner products of a column with all others.
+    pub fn left_of(&self, column: usize) -> Vec<f64> {
+        let mut left = self.weighted.gram[column].clone();
+        for known in &self.rows {
+            let share = known[column];
+            if share != 0.0 {
+                left.iter_mut().zip(known).for_each(|(value, other)| *value -= share * other);
+            }
+        }
+        left
+    }
+
+    /// The same of columns of a form among each other, and with the measured torque.
+    pub fn left_among(&self, form: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let columns = self.all.of(form);
+        let (first, width) = (columns.start, columns.len());
+        let swept = |a: usize, b: usize| self.rows.iter().map(|row| row[first + a] * row[first + b]).sum::<f64>();
+        let gram = |a: usize, b: usize| self.weighted.gram[first + a][first + b] - swept(a, b);
+        (DMatrix::from_fn(width, width, gram), DVector::from_fn(width, |a, _| self.right[first + a]))
+    }
+
+    /// What is left of the inner product of a column with the measured torque.
+    pub fn right_of(&self, column: usize) -> f64 {
+        self.right[column]
     }
 
     /// Whether each coefficient of a form would be positive alone.
     pub fn rises(&self, form: usize) -> bool {
         self.all.of(form).all(|column| self.right[column] > 0.0)
-    }
-
-    /// Coefficients that a form would have beside the present ones; of columns that are not seen, 0.
-    pub fn values(&self, form: usize) -> Vec<f64> {
-        let columns: Vec<usize> = self.all.of(form).collect();
-        let swept = |a: usize, b: usize| self.weighted.gram[a][b] - self.rows.iter().map(|row| row[a] * row[b]).sum::<f64>();
-        let own = |column: &usize| self.weighted.gram[*column][*column];
-        let scale: Vec<f64> = columns.iter().map(|column| own(column).max(f64::MIN_POSITIVE).sqrt()).collect();
-        let mut block =
-            DMatrix::from_fn(columns.len(), columns.len(), |a, b| swept(columns[a], columns[b]) / (scale[a] * scale[b]));
-        (0..columns.len()).for_each(|k| block[(k, k)] += REDUNDANT + self.prior(columns[k]) / (scale[k] * scale[k]));
-        let right = DVector::from_fn(columns.len(), |a, _| self.right[columns[a]] / scale[a]);
-        match block.cholesky() {
-            Some(factor) => factor.solve(&right).iter().zip(&scale).map(|(value, scale)| value / scale).collect(),
-            None => vec![0.0; columns.len()],
-        }
-    }
-
-    /// The same with other inner products of its columns with a residual.
-    pub fn gain_with(&self, form: usize, right: &[f64]) -> f64 {
-        self.gain_of(form, right).square
-    }
-
-    fn gain_of(&self, form: usize, right: &[f64]) -> Gain {
-        let columns = self.all.of(form);
-        let (first, width) = (columns.start, columns.len());
-        let mut block = [0.0; 100];
-        let mut along = [0.0; 10];
-        for a in 0..width {
-            let scale = self.weighted.gram[first + a][first + a];
-            if scale <= 0.0 {
-                continue;
-            }
-            for b in 0..=a {
-                let other = self.weighted.gram[first + b][first + b];
-                if other <= 0.0 {
-                    continue;
-                }
-                let swept: f64 = self.rows.iter().map(|row| row[first + a] * row[first + b]).sum();
-                block[10 * a + b] = (self.weighted.gram[first + a][first + b] - swept) / (scale * other).sqrt();
-            }
-            block[11 * a] += self.prior(first + a) / scale;
-            along[a] = right[first + a] / scale.sqrt();
-        }
-        small_gain(&mut block, &mut along, width)
     }
 
     /// What a form of the set gains beside the others.
@@ -156,11 +144,6 @@ impl<'a> SweptColumns<'a> {
         let values = DVector::from_vec(values);
         let square = covariance.cholesky().map_or(0.0, |factor| values.dot(&factor.solve(&values)));
         Gain { square, rank: columns.len() }
-    }
-
-    /// Whether a form is among the present ones.
-    pub fn has(&self, form: usize) -> bool {
-        self.all.of(form).any(|column| self.pivots.contains(&column))
     }
 
     /// Coefficients of the pivots.
@@ -203,38 +186,4 @@ impl<'a> SweptColumns<'a> {
         let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum();
         halves.iter().flat_map(|a| halves.iter().map(move |b| product(a, b))).collect()
     }
-
-    /// Sweeps the pivots out of other inner products of all columns with a residual.
-    pub fn swept(&self, mut right: Vec<f64>) -> Vec<f64> {
-        for (pivot, row) in self.pivots.iter().zip(&self.rows) {
-            let along = right[*pivot] / row[*pivot];
-            right.iter_mut().zip(row).for_each(|(value, other)| *value -= along * other);
-        }
-        right
-    }
-}
-
-/// Gain of a small scaled system, by a pivoted Cholesky factor; only the lower triangle (rows of 10) is read.
-fn small_gain(block: &mut [f64; 100], along: &mut [f64; 10], width: usize) -> Gain {
-    let mut gain = Gain::default();
-    let mut left: Vec<usize> = (0..width).collect();
-    let at = |a: usize, b: usize| if a >= b { 10 * a + b } else { 10 * b + a };
-    while let Some(place) = (0..left.len()).max_by(|a, b| block[11 * left[*a]].total_cmp(&block[11 * left[*b]])) {
-        let pivot = left.swap_remove(place);
-        let size = block[11 * pivot];
-        if size <= INVISIBLE {
-            break;
-        }
-        let value = along[pivot];
-        gain.square += value * value / size;
-        gain.rank += 1;
-        for a in &left {
-            let share = block[at(*a, pivot)] / size;
-            along[*a] -= share * value;
-            for b in left.iter().filter(|b| *b <= a) {
-                block[at(*a, *b)] -= share * block[at(*b, pivot)];
-            }
-        }
-    }
-    gain
 }

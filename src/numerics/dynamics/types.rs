@@ -16,8 +16,6 @@ pub struct TorqueQuestion {
     pub without: Vec<String>,
     /// Whether the numbers of declared links are moved to the nearest that bodies have.
     pub enforce_bodies: bool,
-    /// Seed of the bootstrap.
-    pub seed: u64,
 }
 
 /// What the simulated torques rest on.

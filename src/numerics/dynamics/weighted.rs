@@ -34,7 +34,7 @@ impl Weighing<'_> {
     }
 }
 
-/// Inner products of whitened columns; those that are left out are zero.
+/// Inner products of whitened columns; those that are left out have none.
 pub(super) struct WeightedColumns {
     pub columns: Vec<TorqueColumn>,
     /// `[joint]`: whitened rows of measured minus rigid torque.
@@ -62,9 +62,10 @@ impl WeightedColumns {
             square: measured.iter().flatten().map(|value| value * value).sum(),
             rows: measured.iter().map(Vec::len).max().unwrap_or(0),
             measured,
-            gram: vec![vec![0.0; count]; count],
+            gram: vec![Vec::new(); count],
             right: vec![0.0; count],
         };
+        chosen.iter().for_each(|number| all.gram[*number] = vec![0.0; count]);
         (0..all.measured.len()).for_each(|joint| all.take_joint(joint, chosen));
         all
     }
@@ -105,6 +106,11 @@ impl WeightedColumns {
         }
     }
 
+    /// Whether a column has inner products.
+    pub fn has(&self, column: usize) -> bool {
+        !self.gram[column].is_empty()
+    }
+
     /// Takes what coefficients explain off the measured torque; inner products stay as they were.
     pub fn subtract(&mut self, solution: &[(usize, f64)]) {
         for (column, value) in solution {
@@ -128,7 +134,7 @@ impl WeightedColumns {
         let mut row: Vec<f64> = self.columns.iter().map(&product).collect();
         row.push(product(&white));
         let right = white.joints.iter().zip(&white.courses).map(|(joint, course)| dot(course, &self.measured[*joint])).sum();
-        self.gram.iter_mut().zip(&row).for_each(|(old, value)| old.push(*value));
+        self.gram.iter_mut().zip(&row).filter(|(old, _)| !old.is_empty()).for_each(|(old, value)| old.push(*value));
         self.gram.push(row);
         self.right.push(right);
         self.columns.push(white);

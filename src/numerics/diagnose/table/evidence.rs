@@ -10,18 +10,18 @@ use crate::diagnose::linear::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// Amplitudes of the grid.
-pub(super) const AMPLITUDES: usize = 28;
+pub(crate) const AMPLITUDES: usize = 28;
 
 /// How much the rows say: degrees of freedom and the squared residual, in standard deviations of the noise.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct EvidenceRows {
+pub(crate) struct EvidenceRows {
     pub freedom: f64,
     pub square: f64,
 }
 
 /// What a group of columns says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct GroupEvidence {
+pub(crate) struct GroupEvidence {
     /// ln of the evidence over that of no such group.
     pub log: f64,
     /// The likeliest amplitude, rms motion at the tool, m.
@@ -37,7 +37,7 @@ impl GroupEvidence {
 
 /// The evidence of columns by their Gram matrix, their products with the residual (both in standard deviations of the noise), and the
 /// shares of the prior variance.
-pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: EvidenceRows) -> GroupEvidence {
+pub(crate) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, shares: &[f64], rows: EvidenceRows) -> GroupEvidence {
     let kept: Vec<usize> = (0..shares.len()).filter(|k| shares[*k] > 0.0).collect();
     let scaled;
     let (diagonal, off_diagonal, along) = if let [k] = kept[..] {
@@ -131,7 +131,7 @@ fn amplitudes() -> impl Iterator<Item = f64> {
 }
 
 /// ln of a sum of exponentials; minus infinity of none.
-pub(super) fn log_sum(logs: &[f64]) -> f64 {
+pub(crate) fn log_sum(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most == f64::NEG_INFINITY { most } else { most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln() }
 }

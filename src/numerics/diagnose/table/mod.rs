@@ -17,7 +17,10 @@ mod search;
 mod state;
 
 pub(crate) use answer::{Answer, FoundCell};
+pub(crate) use evidence::{AMPLITUDES, EvidenceRows, evidence, log_sum};
 pub(crate) use forms::forms_of;
+pub(crate) use search::ComponentSearch;
+pub(crate) use state::KnownState;
 
 use super::round::{EstimatedCause, FitState, Fitter, RoundView};
 use super::types::Located;

@@ -28,6 +28,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub first: Vec<usize>,
     columns: usize,
     pub next: u64,
+    /// Cells that were likely at the last look.
+    pub likely: Vec<usize>,
     /// Keys of cells that are in the model around which the rows are looked at.
     pub from_before: Vec<String>,
     /// Cells of effects that the user declares.
@@ -126,6 +128,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             first,
             columns,
             next: 0,
+            likely: Vec::new(),
             declared,
             from_before: Vec::new(),
             multiplied: shown.to_vec(),

@@ -10,20 +10,113 @@ use crate::criteria::cells::{
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
 
-impl CauseTable<'_, '_> {
-    /// Every component anew given all others: shape and amplitude.
-    pub fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
-        let all = (0..components.len()).collect::<Vec<_>>();
-        self.backfit_some(components, &all, rounds)
+/// A search for what rows show, of components each with its evidence given all others.
+pub(crate) trait ComponentSearch {
+    /// What is found.
+    type Component: Clone;
+
+    /// ln of the odds below which a component leaves.
+    fn least(&self) -> f64;
+    /// The standard deviation of the noise given some components, over what is stated.
+    fn noise(&self, components: &[Self::Component]) -> f64;
+    /// ln of the odds of a component given all others, at a noise; none of one that others need.
+    fn odds(&self, components: &[Self::Component], place: usize, noise: f64) -> Option<f64>;
+    /// What pays most given some components, if anything does.
+    fn best(&mut self, components: &[Self::Component]) -> Option<Self::Component>;
+    /// Components after the last of them has come.
+    fn with_newest(&mut self, components: Vec<Self::Component>) -> Vec<Self::Component>;
+    /// All components anew.
+    fn anew(&mut self, components: Vec<Self::Component>) -> Vec<Self::Component>;
+
+    /// Adds components while they pay.
+    fn add(&mut self, mut components: Vec<Self::Component>) -> Vec<Self::Component> {
+        while let Some(best) = self.best(&components) {
+            components.push(best);
+            components = self.with_newest(components);
+        }
+        components
+    }
+
+    /// Drops components that no longer pay.
+    fn prune(&mut self, mut components: Vec<Self::Component>) -> Vec<Self::Component> {
+        while !components.is_empty() {
+            let noise = self.noise(&components);
+            let odds = (0..components.len()).filter_map(|place| Some((place, self.odds(&components, place, noise)?)));
+            match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((place, odds)) if odds <= self.least() => _ = components.remove(place),
+                _ => break,
+            }
+            components = self.anew(components);
+        }
+        components
+    }
+}
+
+impl ComponentSearch for CauseTable<'_, '_> {
+    type Component = Component;
+
+    fn least(&self) -> f64 {
+        *LEAVES
+    }
+
+    fn noise(&self, components: &[Component]) -> f64 {
+        self.state(&components.iter().collect::<Vec<_>>(), None).kappa
+    }
+
+    fn odds(&self, components: &[Component], i: usize, kappa: f64) -> Option<f64> {
+        let others = without(components, &[i]);
+        let others: Vec<&Component> = others.iter().collect();
+        let state = self.state(&others, Some(kappa));
+        let cell = components[i].cell;
+        let again = others.iter().any(|other| other.cell == cell);
+        let prior = if again { 0.0 } else { self.cells[cell].log_prior };
+        Some(prior + self.log_evidence(&components[i], &state, &others))
+    }
+
+    /// What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
+    /// that in it.
+    fn best(&mut self, components: &[Component]) -> Option<Component> {
+        let now: Vec<&Component> = components.iter().collect();
+        let state = self.state(&now, None);
+        let numbers: usize = components.iter().map(|own| own.part.ncols()).sum();
+        // So many numbers describe rows and explain nothing.
+        if components.len() >= *COMPONENTS || 3.0 * numbers as f64 > state.rows.freedom {
+            return None;
+        }
+        let mut scan = self.scan_some(&self.likely, &state, &now, *CLOSELY, &[]);
+        // A misjudged noise makes everything seem likely.
+        let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
+        if self.likely.len() < self.cells.len() && scan.best().is_none_or(|best| scan.log_odds[best] < price) {
+            scan = self.scan(&state, &now, *CLOSELY, &[]);
+        }
+        // What was unlikely before is asked again when the likely ones are used up.
+        self.likely = scan.order.iter().copied().take(*LIKELY).collect();
+        let best = scan.best().filter(|best| scan.log_odds[*best] >= price)?;
+        let found = &scan.closely[&best];
+        let new = components.iter().filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
+        let moved: f64 = new.map(|own| own.amplitude.powi(2)).sum();
+        (found.amplitude >= *SECOND_ORDER * moved).then(|| self.component(best, found))
     }
 
     /// The newest component and those that do in part what it does.
-    fn backfit_newest(&mut self, components: Vec<Component>) -> Vec<Component> {
+    fn with_newest(&mut self, components: Vec<Component>) -> Vec<Component> {
         let Some(newest) = components.last() else { return components };
         self.parts.know(&components.iter().collect::<Vec<_>>(), self.frame);
         let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > *COUPLED;
         let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
         self.backfit_some(components, &some, 1)
+    }
+
+    fn anew(&mut self, components: Vec<Component>) -> Vec<Component> {
+        self.backfit(components, 2)
+    }
+}
+
+impl CauseTable<'_, '_> {
+    /// Every component anew given all others: shape and amplitude.
+    pub fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
+        let all = (0..components.len()).collect::<Vec<_>>();
+        self.backfit_some(components, &all, rounds)
     }
 
     fn backfit_some(&mut self, mut components: Vec<Component>, some: &[usize], rounds: usize) -> Vec<Component> {
@@ -94,73 +187,17 @@ impl CauseTable<'_, '_> {
         self.backfit(components, 2)
     }
 
-    /// Adds cells while they pay. What is smaller than the second order of what this round has found already waits for the next round, which
-    /// is around a model that has that in it.
-    pub fn grow(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+    /// Adds cells while they pay, then takes all anew.
+    pub fn grow(&mut self, components: Vec<Component>) -> Vec<Component> {
         self.know(&components);
-        let (mut likely, mut has_grown): (Vec<usize>, bool) = ((0..self.cells.len()).collect(), false);
-        while components.len() < *COMPONENTS {
-            let now: Vec<&Component> = components.iter().collect();
-            let state = self.state(&now, None);
-            let mut scan = self.scan_some(&likely, &state, &now, *CLOSELY, &[]);
-            // A misjudged noise makes everything seem likely.
-            let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
-            if likely.len() < self.cells.len() && scan.best().is_none_or(|best| scan.log_odds[best] < price) {
-                scan = self.scan(&state, &now, *CLOSELY, &[]);
-            }
-            // What was unlikely before is asked again when the likely ones are used up.
-            likely = scan.order.iter().copied().take(*LIKELY).collect();
-            let Some(best) = scan.best() else { break };
-            let numbers: usize = components.iter().map(|own| own.part.ncols()).sum();
-            // So many numbers describe rows and explain nothing.
-            if 3.0 * numbers as f64 > state.rows.freedom {
-                break;
-            }
-            if scan.log_odds[best] < price {
-                break;
-            }
-            let found = scan.closely[&best].clone();
-            let new = components.iter().filter(|own| !self.from_before.contains(&self.cells[own.cell].key));
-            let moved: f64 = new.map(|own| own.amplitude.powi(2)).sum();
-            if found.amplitude < *SECOND_ORDER * moved {
-                break;
-            }
-            components.push(self.component(best, &found));
-            components = self.backfit_newest(components);
-            has_grown = true;
-        }
-        if !has_grown {
+        self.likely = (0..self.cells.len()).collect();
+        let before = components.len();
+        let components = self.add(components);
+        if components.len() == before {
             return components;
         }
-        components = self.backfit(components, 2);
+        let components = self.anew(components);
         self.prune(components)
-    }
-
-    /// Drops cells that no longer pay.
-    pub fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        loop {
-            if components.is_empty() {
-                return components;
-            }
-            let kappa = self.state(&components.iter().collect::<Vec<_>>(), None).kappa;
-            let odds: Vec<f64> = (0..components.len()).map(|i| self.log_odds_of(&components, i, kappa)).collect();
-            let least = (0..odds.len()).min_by(|a, b| odds[*a].total_cmp(&odds[*b])).unwrap_or(0);
-            if odds[least] > *LEAVES {
-                return components;
-            }
-            components = self.backfit(without(&components, &[least]), 2);
-        }
-    }
-
-    /// ln of the odds of a component given all others.
-    fn log_odds_of(&self, components: &[Component], i: usize, kappa: f64) -> f64 {
-        let others = without(components, &[i]);
-        let others: Vec<&Component> = others.iter().collect();
-        let state = self.state(&others, Some(kappa));
-        let cell = components[i].cell;
-        let again = others.iter().any(|other| other.cell == cell);
-        let prior = if again { 0.0 } else { self.cells[cell].log_prior };
-        prior + self.log_evidence(&components[i], &state, &others)
     }
 
     /// ln of the evidence of a component's cell, its refined shape among the others.

@@ -277,7 +277,7 @@ impl PartProducts {
 }
 
 /// Some components in the covariance.
-pub(super) struct KnownState {
+pub(crate) struct KnownState {
     /// Standard deviation of the noise over what is stated.
     pub kappa: f64,
     /// What is left, seen through the covariance.
@@ -292,10 +292,15 @@ pub(super) struct KnownState {
 
 impl KnownState {
     /// Components with the noise that fits them, or with a stated one.
-    pub fn of(components: &[&Component], products: &PartProducts, frame: &SearchRows, kappa: Option<f64>) -> Self {
+    pub(super) fn of(components: &[&Component], products: &PartProducts, frame: &SearchRows, kappa: Option<f64>) -> Self {
         let (gram, along) = products.of(components);
+        let known = Self::new(&gram, along, frame.rows(), frame.least_noise(), kappa);
+        Self { components: components.iter().map(|own| own.id).collect(), ..known }
+    }
+
+    /// Columns of unit prior variance in the covariance, by their Gram matrix and their products with the residual of rows.
+    pub fn new(gram: &DMatrix<f64>, along: DVector<f64>, rows: EvidenceRows, least_noise: f64, kappa: Option<f64>) -> Self {
         let count = along.len();
-        let rows = frame.rows();
         let solved = |square: f64| {
             let matrix = Mat::from_fn(count, count, |i, j| gram[(i, j)] + if i == j { square } else { 0.0 });
             let lower = matrix.llt(Side::Lower).map_or_else(|_| Mat::identity(count, count), |factor| factor.L().to_owned());
@@ -308,7 +313,7 @@ impl KnownState {
         if kappa.is_none() {
             for _ in 0..30 {
                 let left = (rows.square - solved_along.norm_squared()).max(0.0);
-                let next = ((*NU + left) / (*NU + rows.freedom)).max(frame.least_noise());
+                let next = ((*NU + left) / (*NU + rows.freedom)).max(least_noise);
                 let done = (next.sqrt() - square.sqrt()).abs() < 1e-4 * square.sqrt();
                 square = next;
                 (lower, solved_along) = solved(square);
@@ -322,14 +327,14 @@ impl KnownState {
             kappa: square.sqrt(),
             // Rows that leave less than the least noise do not make it smaller.
             rows: EvidenceRows { square: left, freedom: rows.freedom.min(left) },
-            components: components.iter().map(|own| own.id).collect(),
+            components: Vec::new(),
             lower,
             along: solved_along,
         }
     }
 
     /// The likeliest coefficients (SI) of its components, one component after another.
-    pub fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
+    pub(super) fn coefficients(&self, components: &[&Component], frame: &SearchRows) -> Vec<Vec<f64>> {
         let left = DVector::from_vec(self.left(components, frame));
         let of = |own: &&Component| {
             let along = own.values.tr_mul(&left.rows(0, own.values.nrows())) / (self.kappa * self.kappa);
@@ -340,7 +345,7 @@ impl KnownState {
     }
 
     /// What its components leave of the residual at their likeliest.
-    pub fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
+    pub(super) fn left(&self, components: &[&Component], frame: &SearchRows) -> Vec<f64> {
         let residual = DVector::from_column_slice(frame.residual());
         let left = self
             .weights()
@@ -374,29 +379,35 @@ impl KnownState {
 
     /// Gram matrix and gradient of a group seen through the covariance; `across` is L^-1 Z'X of its block from column `first` on.
     fn seen(&self, group: &SeenGroup, across: &DMatrix<f64>, first: usize) -> (DMatrix<f64>, DVector<f64>) {
+        self.see((&group.gram, &group.gradient), across, first + group.range.start)
+    }
+
+    /// The same of columns by their Gram matrix and gradient.
+    pub fn see(
+        &self,
+        (gram, gradient): (&DMatrix<f64>, &DVector<f64>),
+        across: &DMatrix<f64>,
+        first: usize,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let square = self.kappa * self.kappa;
         if self.along.is_empty() {
-            return (&group.gram / square, &group.gradient / square);
+            return (gram / square, gradient / square);
         }
         let rows = across.nrows();
-        let column = |j: usize| {
-            let start = (first + group.range.start + j) * rows;
-            &across.as_slice()[start..start + rows]
-        };
-        let count = group.range.len();
-        let mut gram = group.gram.clone();
-        for j in 0..count {
+        let column = |j: usize| &across.as_slice()[(first + j) * rows..(first + j + 1) * rows];
+        let mut seen = gram.clone();
+        for j in 0..gradient.len() {
             for i in 0..=j {
-                gram[(i, j)] = (gram[(i, j)] - dot(column(i), column(j))) / square;
-                gram[(j, i)] = gram[(i, j)];
+                seen[(i, j)] = (seen[(i, j)] - dot(column(i), column(j))) / square;
+                seen[(j, i)] = seen[(i, j)];
             }
         }
-        let gradient = DVector::from_fn(count, |j, _| (group.gradient[j] - dot(column(j), self.along.as_slice())) / square);
-        (gram, gradient)
+        let along = |j: usize, _| (gradient[j] - dot(column(j), self.along.as_slice())) / square;
+        (seen, DVector::from_fn(gradient.len(), along))
     }
 
     /// Standard error of each coefficient (SI) of a block of one group given the components.
-    pub fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
+    pub(super) fn errors(&self, block: &CellColumns, across: &DMatrix<f64>) -> Vec<f64> {
         let [group] = &block.groups[..] else { return Vec::new() };
         let (gram, _) = self.seen(group, across, 0);
         let inverse = gram.try_inverse();
@@ -409,7 +420,7 @@ impl KnownState {
     }
 
     /// ln of the largest evidence that any shape of a block could have, whatever its prior: that of its least squares fit.
-    pub fn bound(&self, block: &CellColumns, across: &DMatrix<f64>, first: usize) -> f64 {
+    pub(super) fn bound(&self, block: &CellColumns, across: &DMatrix<f64>, first: usize) -> f64 {
         let (whole, half) = (*NU + self.rows.square, 0.5 * (self.rows.freedom + *NU));
         let mut most = f64::NEG_INFINITY;
         for group in &block.groups {
@@ -433,7 +444,7 @@ impl KnownState {
 
     /// What each group of a block says: for every shape ln of its evidence with its weight, and its amplitude; nothing of a shape whose
     /// coefficient would have a size that it cannot have.
-    pub fn shapes(
+    pub(super) fn shapes(
         &self,
         block: &CellColumns,
         across: &DMatrix<f64>,

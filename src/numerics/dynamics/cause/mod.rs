@@ -183,6 +183,10 @@ pub(super) trait TorqueCause: Sync {
     fn inertial(&self, _form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
         None
     }
+    /// What tells its cells at a place from each other.
+    fn cell(&self, _form: &TorqueForm) -> [usize; 2] {
+        [0; 2]
+    }
     /// Whether the form is part of the rich model, which noise is taken from.
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         self.about().rich
@@ -295,6 +299,11 @@ impl TorqueForm {
             within.shape[span.index] = span.usual?;
         }
         (!self.cause.has_ends(self)).then_some(within)
+    }
+
+    /// Whether it modifies the friction that another form is.
+    pub fn modifies(&self, friction: &Self) -> bool {
+        self.place == friction.place && self.cause.about().modifies.contains(&friction.cause.name())
     }
 
     /// Whether both are the same cause at the same place.

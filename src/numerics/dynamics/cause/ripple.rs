@@ -27,11 +27,6 @@ impl TorqueCause for Ripple {
         of_angle: true,
     }
 
-    /// As common as other causes, over all orders together.
-    fn price(&self, _form: &TorqueForm) -> f64 {
-        6.0 + 2.0 * ((ORDERS + MOTOR_ORDERS) as f64).ln()
-    }
-
     fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
         let mut forms = Vec::new();
         for joint in 0..scene.joints() {

@@ -31,6 +31,10 @@ impl TorqueCause for Unnamed {
         forms
     }
 
+    fn cell(&self, form: &TorqueForm) -> [usize; 2] {
+        form.with
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
         let [first, second] = form.with.map(|joint| &scene.position[joint]);
         match column {

@@ -66,6 +66,10 @@ impl TorqueCause for WristCoupling {
         vec![ShapeSpan { name: "ratio", unit: "1", index: 0, least, most, by_ratio: false, usual: None }]
     }
 
+    fn cell(&self, form: &TorqueForm) -> [usize; 2] {
+        form.with
+    }
+
     fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]) {
         let (moved, by, ratio) = (form.joint(), form.with[0], form.shape[0]);
         let share = if joint == moved { 1.0 } else { ratio };
