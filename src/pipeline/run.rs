@@ -217,10 +217,12 @@ impl Running<'_> {
         let mut records = Vec::new();
         for file in &self.state.plan.stages[index].files {
             let metadata = std::fs::metadata(&file.path).ok();
+            // Of a folder of parts all of them.
+            let bounds = crate::raw::source(&file.path).and_then(|mut source| source.bounds()).unwrap_or_default();
             records.push(FileRecord {
                 place: file.place.clone(),
                 path: file.path.display().to_string(),
-                bytes: metadata.as_ref().map_or(0, std::fs::Metadata::len),
+                bytes: bounds.last().copied().unwrap_or_default(),
                 modified: metadata.and_then(|metadata| metadata.modified().ok()).map(rfc3339),
                 blake3: self.state.hash(&file.path)?,
             });

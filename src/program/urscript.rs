@@ -380,19 +380,15 @@ impl<'p> Reader<'p> {
         for (name, six) in std::mem::take(&mut self.held) {
             let (is_target, handed) = (self.uses.moved_to.contains(&name), self.uses.handed_on.get(&name));
             match (is_target, handed) {
-                (true, Some((at, how))) => {
-                    if told.insert(name.clone()) {
-                        self.found.fault(*at, format!("the target `{name}` {how}: calib cannot say what becomes of it there"));
-                    }
+                (true, Some((at, how))) if told.insert(name.clone()) => {
+                    self.found.fault(*at, format!("the target `{name}` {how}: calib cannot say what becomes of it there"));
                 }
                 (true, None) => {
                     let posture = near.get(&name).filter(|_| six.is_pose).map_or(PostureStatement::Unstated, |q| near_to(q));
                     self.found.literals.push(six.literal(posture));
                 }
-                (false, Some((at, how))) if six.is_pose => {
-                    if told.insert(name.clone()) {
-                        self.found.fault(*at, format!("the pose `{name}` {how}: calib cannot say whether it is a target"));
-                    }
+                (false, Some((at, how))) if six.is_pose && told.insert(name.clone()) => {
+                    self.found.fault(*at, format!("the pose `{name}` {how}: calib cannot say whether it is a target"));
                 }
                 _ => {}
             }

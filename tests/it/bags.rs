@@ -256,6 +256,55 @@ fn each_message_that_is_not_used_has_its_reason() {
 }
 
 #[test]
+fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() {
+    let messages: Vec<Message> = (0..40i64)
+        .flat_map(|k| {
+            let (ns, q) = (START + k * SECOND, std::array::from_fn::<f64, 6, _>(|j| wave(k as usize, j)));
+            let state = joint_state(false, ns, &ARM, [&q, &[], &[]]);
+            [("/joint_states", JOINTS, ns, state), ("/reflector", POINT, ns, point(false, ns, [1.0, 0.01 * k as f64, 0.5]))]
+        })
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let parts = folder.path().join("run");
+    std::fs::create_dir(&parts).unwrap();
+    for (part, messages) in messages.chunks(8).enumerate() {
+        std::fs::write(parts.join(format!("run_{part}.mcap")), mcap(Some(Compression::Zstd), messages)).unwrap();
+    }
+    let pipeline = POSES.replace("run.mcap", "run");
+    let (recording, _, intake, _) = run(folder.path(), &pipeline);
+    assert_eq!((recording.rows(), intake.0[0].read), (40, 40));
+    let (.., said) = run(folder.path(), &pipeline);
+    assert!(said.contains("ingest  cached"), "{said}");
+    let last = parts.join("run_9.mcap");
+    std::fs::write(&last, &std::fs::read(&last).unwrap()[..300]).unwrap();
+    let (recording, .., said) = run(folder.path(), &pipeline);
+    assert!(recording.rows() < 40 && said.contains("part 10: it is cut or damaged before byte"), "{said}");
+    // Two kinds of parts are no recording, nor is a folder of anything else.
+    std::fs::write(parts.join("run_3.db3"), db3(&messages[..8])).unwrap();
+    let output = calib(folder.path(), &["check", "p.yaml"], "");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && said.contains("all .mcap or all .db3"), "{said}");
+}
+
+#[test]
+fn two_robots_in_one_topic_are_told_by_their_joints() {
+    let of = |arm: &str, k: i64, q: f64| {
+        let names: Vec<String> = ARM.iter().map(|joint| format!("{arm}{joint}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        ("/joint_states", JOINTS, START + k, joint_state(k % 2 == 0, START + k * SECOND / 10, &names, [&[q; 6], &[], &[]]))
+    };
+    let mut messages: Vec<Message> = (0..30).flat_map(|k| [of("left_", k, 0.3), of("", k, 0.01 * k as f64)]).collect();
+    messages.extend(
+        (0..30).map(|k| ("/reflector", POINT, START, point(false, START + k * SECOND / 10, [1.0, 0.01 * k as f64, 0.5]))),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("run.mcap"), mcap(None, &messages)).unwrap();
+    let (recording, rejected, intake, _) = run(folder.path(), POSES);
+    assert_eq!((recording.rows(), rejected.0.len(), intake.0[0].read), (30, 30, 60));
+    assert!(rejected.0.iter().all(|row| row.reason == "foreign" && row.detail.contains("its joints: left_shoulder_pan_joint")));
+}
+
+#[test]
 fn init_reads_a_bag_and_its_pipeline_runs() {
     let mut messages: Vec<Message> = Vec::new();
     for k in 0..60i64 {

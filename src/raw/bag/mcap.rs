@@ -6,6 +6,7 @@ use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
 use std::sync::Arc;
 
 /// How a file begins.
@@ -17,7 +18,7 @@ const LONGEST: usize = 1 << 30;
 const HEADER: usize = 22;
 
 pub(super) struct McapMessages {
-    source: Box<dyn Source>,
+    source: BufReader<Box<dyn Source>>,
     reader: LinearReader,
     /// Place in the source, where the file ends, and where it begins.
     at: u64,
@@ -40,6 +41,7 @@ impl McapMessages {
     pub(super) fn open(source: Box<dyn Source>, [start, end]: [u64; 2]) -> Self {
         let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_record_length_limit(LONGEST);
         let reader = LinearReader::new_with_options(options);
+        let source = BufReader::with_capacity(BLOCK, source);
         Self { source, reader, at: start, end, start, schemas: BTreeMap::new(), channels: BTreeMap::new() }
     }
 
@@ -85,8 +87,8 @@ impl McapMessages {
         if asked as u64 > left {
             return Ok(false);
         }
-        let bytes = (asked.max(BLOCK) as u64).min(left) as usize;
-        let read = self.source.read(self.reader.insert(bytes)).map_err(|error| error.to_string())?;
+        // No more than it asked for: it keeps what it does not need yet.
+        let read = self.source.read(self.reader.insert(asked)).map_err(|error| error.to_string())?;
         self.reader.notify_read(read);
         self.at += read as u64;
         Ok(read > 0)
@@ -121,6 +123,6 @@ impl Container for McapMessages {
         self.at
     }
     fn into_source(self: Box<Self>) -> Box<dyn Source> {
-        self.source
+        self.source.into_inner()
     }
 }

@@ -228,6 +228,9 @@ fn columns(statement: &str) -> Vec<String> {
     inside.split(',').map(name).collect()
 }
 
+/// Topics by their numbers, the rows of messages, and places of topic, time and content among their columns.
+type BagTables = (BTreeMap<i64, Arc<Topic>>, TableRows, [usize; 3]);
+
 pub(super) struct SqliteMessages {
     pages: Pages,
     topics: BTreeMap<i64, Arc<Topic>>,
@@ -248,7 +251,7 @@ impl SqliteMessages {
         }
     }
 
-    fn tables(pages: &mut Pages) -> Result<(BTreeMap<i64, Arc<Topic>>, TableRows, [usize; 3]), String> {
+    fn tables(pages: &mut Pages) -> Result<BagTables, String> {
         let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
         let mut rows = TableRows::new(1);
         while let Some(cell) = rows.next(pages)? {

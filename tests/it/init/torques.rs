@@ -114,7 +114,11 @@ fn lists_of_a_parquet_file_are_columns_of_which_the_first_are_the_joints() {
 #[test]
 fn programs_and_bags_are_named_as_what_they_are_by_init_and_by_check() {
     for (name, content, said) in [
-        ("measure.txt", &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..], "is a FANUC program (a listing of TP): name it .ls"),
+        (
+            "measure.txt",
+            &b"/PROG  MEASURE\n/ATTR\nOWNER = MNEDITOR;\n/POS\nP[1]{\n"[..],
+            "is a FANUC program (a listing of TP): name it .ls",
+        ),
         (
             "measure.prg.txt",
             b"MODULE Measure\n  CONST jointtarget p1:=[[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",

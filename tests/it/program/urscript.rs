@@ -6,7 +6,7 @@ use calib::program::{Language, Partial, PostureStatement, Program, joint_list};
 const SCRIPT: &str = "def weld():
   set_tcp(p[0, 0, 0.1, 0, 0, 0])   # the torch, p[1,2,3,4,5,6]
   set_payload(1.5, [0, 0, 0.05])
-  global wp1_p = p[.5, -0.25, 3E-1, 0, 3.14159, 0]
+  global wp1_p = p[.5, -0.25, 3E-1, 0, 3.1, 0]
   global wp1_q=[-1.6, -1.73, -2.2, -0.81, 1.6, 0]
   global limits = [1, 2, 3, 4, 5, 6]
   home = [0, -1.57, 1.57, 0, 1.57, 0]
@@ -30,7 +30,7 @@ fn poses_and_joints_of_motions_are_targets_where_they_are_written() {
     let (found, warned) = accepted(Language::UrScript, SCRIPT);
     let pose = |v: [f64; 6]| (TargetKind::RotationVector, v.to_vec());
     let expected = [
-        pose([0.5, -0.25, 0.3, 0.0, 3.14159, 0.0]),
+        pose([0.5, -0.25, 0.3, 0.0, 3.1, 0.0]),
         (TargetKind::Radians, vec![0.0, -1.57, 1.57, 0.0, 1.57, 0.0]),
         pose([0.4, 0.0, 0.3, 0.0, 3.0, 0.0]),
         pose([0.4, 0.1, 0.3, 0.0, 3.0, 0.0]),
