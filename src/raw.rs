@@ -22,7 +22,7 @@ pub use delimited::{Delimiter, TextLayout, TextRows, fields, unquoted_text};
 pub use not_read::not_read;
 pub use number::{DecimalMark, NumberFault, number, number_of_any_mark};
 pub use record::{Record, RecordFault, RecordReader, failed};
-pub use source::{Source, source};
+pub use source::{InputSource, source};
 pub use text::{decoded_text, is_utf16, shown, without_utf16};
 pub use workbook::{Workbook, is_workbook};
 

@@ -322,7 +322,13 @@ impl Reader<'_, '_> {
             Some(PostureStatement::Config { flip: wrist == "F", up: elbow == "U", turns })
         };
         match read() {
-            Some(posture) => (posture, parts[1..].to_vec()),
+            Some(posture) => {
+                // Once a listing: what the letters mean stands in no file.
+                if !self.found.frames.iter().any(|(_, known)| known == POSTURES) {
+                    self.found.frame(span.start, POSTURES);
+                }
+                (posture, parts[1..].to_vec())
+            }
             None => {
                 let text = quoted(self.source.bytes, span.clone());
                 self.found.fault(span.start, format!("configuration {text} is not read; {EXPECTED}"));
@@ -331,6 +337,10 @@ impl Reader<'_, '_> {
         }
     }
 }
+
+/// What is taken for granted of the letters of a configuration.
+const POSTURES: &str =
+    "CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller";
 
 /// Motions whose targets are elsewhere than the listing says, or not in it.
 fn motions(bytes: &[u8], found: &mut Gathered) {

@@ -9,11 +9,11 @@ mod message;
 mod sqlite;
 
 use super::record::{Record, RecordFault, RecordReader};
-use super::source::Source;
+use super::source::InputSource;
 use crate::error::{Error, Result};
 pub use content::{BagContent, BagTopic, bag_content};
 use content::{no_topic, only_topic};
-use message::{Cell, Cells, KINDS, Kind};
+use message::{FieldValue, KINDS, MessageCells, MessageKind};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ struct Topic {
 
 impl Topic {
     /// What is known of its type, where it is read.
-    fn known(&self) -> Option<&'static Kind> {
+    fn known(&self) -> Option<&'static MessageKind> {
         KINDS.iter().find(|kind| self.encoding == "cdr" && kind.name == self.kind)
     }
 }
@@ -61,7 +61,7 @@ trait Container: Send {
     /// Place in the source.
     fn position(&self) -> u64;
     /// Gives the source back.
-    fn into_source(self: Box<Self>) -> Box<dyn Source>;
+    fn into_source(self: Box<Self>) -> Box<dyn InputSource>;
 }
 
 /// Whether a file that begins so is a bag.
@@ -71,7 +71,7 @@ pub fn is_bag(head: &[u8]) -> bool {
 
 /// The messages of all parts of a bag.
 struct Messages {
-    source: Option<Box<dyn Source>>,
+    source: Option<Box<dyn InputSource>>,
     container: Option<Box<dyn Container>>,
     bounds: Vec<u64>,
     /// The next part.
@@ -81,7 +81,7 @@ struct Messages {
 }
 
 impl Messages {
-    fn open(mut source: Box<dyn Source>) -> std::io::Result<Self> {
+    fn open(mut source: Box<dyn InputSource>) -> std::io::Result<Self> {
         let bounds = source.bounds()?;
         Ok(Self { source: Some(source), container: None, bounds, part: 0, topics: Vec::new(), losses: Vec::new() })
     }
@@ -149,11 +149,11 @@ pub struct BagRows {
     /// The topic, and the frames of it that are wanted.
     topic: String,
     frames: Option<String>,
-    kind: &'static Kind,
+    kind: &'static MessageKind,
     /// Messages that were read for their columns, and are still to be handed out.
     head: VecDeque<Message>,
     message: Message,
-    cells: Cells,
+    cells: MessageCells,
     is_named: bool,
     /// Columns that are asked for: whether a row may lack them.
     wanted: Option<Vec<Option<bool>>>,
@@ -165,7 +165,7 @@ pub struct BagRows {
 
 impl BagRows {
     /// Opens a topic; without a name the only one whose type is read.
-    pub fn open(source: Box<dyn Source>, label: &str, topic: Option<&str>) -> Result<Self> {
+    pub fn open(source: Box<dyn InputSource>, label: &str, topic: Option<&str>) -> Result<Self> {
         let failed = |error: std::io::Error| super::failed(label, &error);
         let (source, topic) = match topic {
             Some(topic) => (source, topic.to_string()),
@@ -173,8 +173,8 @@ impl BagRows {
         };
         let (name, frames) = topic.split_once(' ').map_or((topic.as_str(), None), |(name, frames)| (name, Some(frames)));
         let mut messages = Messages::open(source).map_err(failed)?;
-        let (mut head, mut cells, mut bytes) = (VecDeque::new(), Cells::default(), 0);
-        ["received", "stamp"].into_iter().for_each(|name| cells.set(name, Cell::Absent));
+        let (mut head, mut cells, mut bytes) = (VecDeque::new(), MessageCells::default(), 0);
+        ["received", "stamp"].into_iter().for_each(|name| cells.set(name, FieldValue::Absent));
         let (mut message, mut kind) = (Message::default(), None);
         while head.len() < HEAD && bytes < HEAD_BYTES && messages.next(&|other| other == name, &mut message) {
             let found = message.topic.known().filter(|kind| kind.of_frames == frames.is_some());
@@ -217,13 +217,14 @@ impl BagRows {
             return Some((RecordFault::Damaged, why));
         }
         let needed = self.wanted.iter().flatten().zip(&self.cells.cells).enumerate();
-        if let Some((column, _)) = needed.into_iter().find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == Cell::Absent)
+        if let Some((column, _)) =
+            needed.into_iter().find(|(_, (wanted, cell))| **wanted == Some(true) && **cell == FieldValue::Absent)
         {
             let names = self.cells.joints();
             let has = if names.is_empty() { String::new() } else { format!("; its joints: {names}") };
             return Some((RecordFault::Foreign, format!("the message has no `{}`{has}", self.cells.names[column])));
         }
-        let Some(Cell::Time(stamp)) = self.cells.cells.get(1) else { return None };
+        let Some(FieldValue::Time(stamp)) = self.cells.cells.get(1) else { return None };
         let before = self.last.replace((*stamp, self.rows));
         let (_, number) = before.filter(|(before, _)| before == stamp)?;
         self.last = before;
@@ -260,14 +261,14 @@ impl RecordReader for BagRows {
         };
         self.rows += 1;
         record.begin(self.rows);
-        self.cells.cells[0] = Cell::Time(self.message.received);
+        self.cells.cells[0] = FieldValue::Time(self.message.received);
         record.fault = self.fault(read);
         for (column, cell) in self.cells.cells.iter().enumerate() {
             let is_asked = self.wanted.as_ref().is_none_or(|wanted| wanted.get(column).is_some_and(Option::is_some));
             match cell {
-                Cell::Number(number) if is_asked => record.push(self.text.format(*number).as_bytes()),
-                Cell::Time(ns) if is_asked => record.push(time(*ns).as_bytes()),
-                Cell::Text(text) if is_asked => record.push(text.as_bytes()),
+                FieldValue::Number(number) if is_asked => record.push(self.text.format(*number).as_bytes()),
+                FieldValue::Time(ns) if is_asked => record.push(time(*ns).as_bytes()),
+                FieldValue::Text(text) if is_asked => record.push(text.as_bytes()),
                 _ => record.push(b""),
             }
         }

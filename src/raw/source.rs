@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const PARTS: [&str; 2] = ["mcap", "db3"];
 
 /// Bytes that can be read at any place.
-pub trait Source: Read + Seek + Send {
+pub trait InputSource: Read + Seek + Send {
     /// Where each part begins, then where the last one ends. Leaves the place at the beginning.
     fn bounds(&mut self) -> io::Result<Vec<u64>> {
         let end = self.seek(SeekFrom::End(0))?;
@@ -18,11 +18,11 @@ pub trait Source: Read + Seek + Send {
     }
 }
 
-impl Source for File {}
-impl Source for Cursor<Vec<u8>> {}
+impl InputSource for File {}
+impl InputSource for Cursor<Vec<u8>> {}
 
 /// Opens a regular file, or a folder that holds the parts of a bag.
-pub fn source(path: &Path) -> io::Result<Box<dyn Source>> {
+pub fn source(path: &Path) -> io::Result<Box<dyn InputSource>> {
     if !path.is_dir() {
         return Ok(Box::new(open(path)?));
     }
@@ -86,7 +86,7 @@ impl Seek for JoinedParts {
     }
 }
 
-impl Source for JoinedParts {
+impl InputSource for JoinedParts {
     fn bounds(&mut self) -> io::Result<Vec<u64>> {
         self.at = 0;
         Ok(self.bounds.clone())

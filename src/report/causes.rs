@@ -1,8 +1,7 @@
 //! The picture of the table of causes: what was found and what is left, by place and by what it follows.
 
-use super::findings::sentence_case;
 use super::number::significant;
-use super::page::render;
+use super::page::{render, sentence_case};
 use crate::error::Result;
 use crate::table::{CauseGrid, CauseGridCell, Cells, Findings};
 use serde_json::{Value, json};

@@ -3,6 +3,7 @@
 use super::Tables;
 use super::axis::{Area, Scale, baseline, label, name_x, name_y};
 use super::number::{count, mm, significant};
+use super::page::sentence_case;
 use super::svg::Svg;
 use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, VerdictTopic, formula_in_words};
 use crate::units::Unit;
@@ -134,13 +135,6 @@ fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
         Some(gone) => format!("This step is not the one that the run uses: {gone}. {said}"),
         None => said,
     }
-}
-
-/// A statement as a sentence of its own.
-pub(super) fn sentence_case(statement: &str) -> String {
-    let mut letters = statement.chars();
-    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
-    format!("{first}{}.", letters.as_str())
 }
 
 /// A chance; what floating point no longer holds is not zero.

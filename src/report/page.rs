@@ -16,3 +16,10 @@ pub(super) fn render(name: &str, template: &str, page: &impl Serialize) -> Resul
         .and_then(|()| environment.get_template(name)?.render(Serde(page)))
         .map_err(|error| Error::Bug(format!("template {name}: {error:#}")))
 }
+
+/// A statement as a sentence of its own.
+pub(super) fn sentence_case(statement: &str) -> String {
+    let mut letters = statement.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
+}

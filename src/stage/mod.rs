@@ -66,7 +66,7 @@ pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
 use crate::error::{Fault, Result};
-use crate::raw::Source;
+use crate::raw::InputSource;
 use crate::table::{Frame, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -271,7 +271,7 @@ pub struct OpenedInput {
     /// As the user named it, for messages and tables.
     pub label: String,
     /// Its bytes.
-    pub reader: Box<dyn Source>,
+    pub reader: Box<dyn InputSource>,
     /// Bytes, where known.
     pub size: Option<u64>,
 }

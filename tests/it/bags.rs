@@ -4,7 +4,7 @@ mod write;
 
 use crate::compensate::calib;
 use calib::error::Result;
-use calib::raw::{BagRows, Record, RecordFault, RecordReader, Source, source};
+use calib::raw::{BagRows, InputSource, Record, RecordFault, RecordReader, source};
 use calib::table::{Intake, Recording, Rejected, from_file};
 use mcap::Compression;
 use std::io::Cursor;
@@ -26,7 +26,7 @@ fn every(messages: &[Message]) -> Vec<Vec<u8>> {
 type Rows = (Vec<String>, Vec<Vec<String>>, Option<String>);
 
 /// Names, rows and what is lost.
-fn rows_of(bag: Box<dyn Source>, topic: Option<&str>) -> Result<Rows> {
+fn rows_of(bag: Box<dyn InputSource>, topic: Option<&str>) -> Result<Rows> {
     let (mut reader, mut record, mut rows) = (BagRows::open(bag, "run.bag", topic)?, Record::default(), Vec::new());
     reader.next(&mut record)?;
     let names = record.cells();

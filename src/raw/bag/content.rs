@@ -3,7 +3,7 @@
 use super::message::{self, KINDS};
 use super::{Message, Messages};
 use crate::error::{Error, Result, counted};
-use crate::raw::{Source, failed};
+use crate::raw::{InputSource, failed};
 use std::collections::BTreeMap;
 
 /// What a bag holds of one topic; of one of frames, of one pair of them.
@@ -50,11 +50,11 @@ pub struct BagContent {
     pub topics: Vec<BagTopic>,
     /// What of it is lost.
     pub loss: Option<String>,
-    source: Box<dyn Source>,
+    source: Box<dyn InputSource>,
 }
 
 /// Reads a bag once for what it holds.
-pub fn bag_content(source: Box<dyn Source>, label: &str) -> Result<BagContent> {
+pub fn bag_content(source: Box<dyn InputSource>, label: &str) -> Result<BagContent> {
     let mut messages = Messages::open(source).map_err(|error| failed(label, &error))?;
     let (mut message, mut found) = (Message::default(), BTreeMap::<String, BagTopic>::new());
     while messages.next(&|_| true, &mut message) {
@@ -86,7 +86,7 @@ pub fn bag_content(source: Box<dyn Source>, label: &str) -> Result<BagContent> {
 }
 
 /// The only topic of a bag whose type is read.
-pub(super) fn only_topic(source: Box<dyn Source>, label: &str) -> Result<(Box<dyn Source>, String)> {
+pub(super) fn only_topic(source: Box<dyn InputSource>, label: &str) -> Result<(Box<dyn InputSource>, String)> {
     let content = bag_content(source, label)?;
     let mut read = content.topics.iter().filter(|topic| topic.is_read && topic.messages > 0);
     match (read.next(), read.next()) {

@@ -1,7 +1,7 @@
 //! Messages of an MCAP file from its first byte to its last whole record: what the index at its end says is not needed.
 
 use super::{Container, Message, Topic};
-use crate::raw::{Source, decoded};
+use crate::raw::{InputSource, decoded};
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
@@ -18,7 +18,7 @@ const LONGEST: usize = 1 << 30;
 const HEADER: usize = 22;
 
 pub(super) struct McapMessages {
-    source: BufReader<Box<dyn Source>>,
+    source: BufReader<Box<dyn InputSource>>,
     reader: LinearReader,
     /// Place in the source, where the file ends, and where it begins.
     at: u64,
@@ -29,7 +29,7 @@ pub(super) struct McapMessages {
 }
 
 /// What a step of the decoder gives.
-enum Step {
+enum ReadStep {
     Read(usize),
     Message,
     Other,
@@ -38,30 +38,30 @@ enum Step {
 
 impl McapMessages {
     /// The file between two places of the source.
-    pub(super) fn open(source: Box<dyn Source>, [start, end]: [u64; 2]) -> Self {
+    pub(super) fn open(source: Box<dyn InputSource>, [start, end]: [u64; 2]) -> Self {
         let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_record_length_limit(LONGEST);
         let reader = LinearReader::new_with_options(options);
         let source = BufReader::with_capacity(BLOCK, source);
         Self { source, reader, at: start, end, start, schemas: BTreeMap::new(), channels: BTreeMap::new() }
     }
 
-    fn step(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<Step, McapError> {
+    fn step(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<ReadStep, McapError> {
         let (opcode, data) = match self.reader.next_event() {
-            None => return Ok(Step::End),
-            Some(Ok(LinearReadEvent::ReadRequest(bytes))) => return Ok(Step::Read(bytes)),
+            None => return Ok(ReadStep::End),
+            Some(Ok(LinearReadEvent::ReadRequest(bytes))) => return Ok(ReadStep::Read(bytes)),
             Some(Ok(LinearReadEvent::Record { opcode, data })) => (opcode, data),
             Some(Err(error)) => return Err(error),
         };
         if opcode == op::MESSAGE {
             let Some((header, content)) = data.split_at_checked(HEADER) else { return Err(McapError::UnexpectedEof) };
             let channel = u16::from_le_bytes([header[0], header[1]]);
-            let Some(topic) = self.channels.get(&channel).filter(|topic| wanted(&topic.name)) else { return Ok(Step::Other) };
+            let Some(topic) = self.channels.get(&channel).filter(|topic| wanted(&topic.name)) else { return Ok(ReadStep::Other) };
             let time = header[6..14].first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
             message.received = i64::try_from(time).unwrap_or(i64::MAX);
             message.topic = topic.clone();
             message.data.clear();
             message.data.extend_from_slice(content);
-            return Ok(Step::Message);
+            return Ok(ReadStep::Message);
         }
         match opcode {
             op::SCHEMA => {
@@ -78,7 +78,7 @@ impl McapMessages {
             }
             _ => {}
         }
-        Ok(Step::Other)
+        Ok(ReadStep::Other)
     }
 
     /// Hands bytes to the decoder, of which it asked for so many; false where the file has fewer.
@@ -105,10 +105,10 @@ impl Container for McapMessages {
         loop {
             let step = decoded(|| self.step(wanted, message));
             match step.and_then(|step| step.map_err(|error| error.to_string())).map_err(|why| self.lost(&why))? {
-                Step::Message => return Ok(true),
-                Step::End => return Ok(false),
-                Step::Other => {}
-                Step::Read(bytes) => {
+                ReadStep::Message => return Ok(true),
+                ReadStep::End => return Ok(false),
+                ReadStep::Other => {}
+                ReadStep::Read(bytes) => {
                     if !self.feed(bytes).map_err(|why| self.lost(&why))? {
                         return Err(self.lost("it has no end: a recorder that was stopped, or a copy that was cut"));
                     }
@@ -122,7 +122,7 @@ impl Container for McapMessages {
     fn position(&self) -> u64 {
         self.at
     }
-    fn into_source(self: Box<Self>) -> Box<dyn Source> {
+    fn into_source(self: Box<Self>) -> Box<dyn InputSource> {
         self.source.into_inner()
     }
 }

@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 /// A part of a message, in the order in which they stand.
-enum Part {
+enum FieldType {
     /// A time of the header: the column `stamp`.
     Stamp,
     /// A text: a column of this name.
@@ -23,16 +23,16 @@ enum Part {
 }
 
 /// A type of message that is read.
-pub(super) struct Kind {
+pub(super) struct MessageKind {
     pub name: &'static str,
     /// It holds any number of them; which one is read is said by its two frames.
     pub of_frames: bool,
-    parts: &'static [Part],
+    parts: &'static [FieldType],
 }
 
-use Part::{Dimensions, List, Names, Number, OfNames, Stamp, Text};
+use FieldType::{Dimensions, List, Names, Number, OfNames, Stamp, Text};
 
-const TRANSFORM: &[Part] = &[
+const TRANSFORM: &[FieldType] = &[
     Stamp,
     Text("frame_id"),
     Text("child_frame_id"),
@@ -46,18 +46,18 @@ const TRANSFORM: &[Part] = &[
 ];
 
 /// Types of messages that are read.
-pub(super) const KINDS: &[Kind] = &[
-    Kind {
+pub(super) const KINDS: &[MessageKind] = &[
+    MessageKind {
         name: "sensor_msgs/msg/JointState",
         of_frames: false,
         parts: &[Stamp, Text("frame_id"), Names, OfNames("position"), OfNames("velocity"), OfNames("effort")],
     },
-    Kind {
+    MessageKind {
         name: "geometry_msgs/msg/PointStamped",
         of_frames: false,
         parts: &[Stamp, Text("frame_id"), Number("point.x"), Number("point.y"), Number("point.z")],
     },
-    Kind {
+    MessageKind {
         name: "geometry_msgs/msg/PoseStamped",
         of_frames: false,
         parts: &[
@@ -72,15 +72,15 @@ pub(super) const KINDS: &[Kind] = &[
             Number("orientation.w"),
         ],
     },
-    Kind { name: "geometry_msgs/msg/TransformStamped", of_frames: false, parts: TRANSFORM },
-    Kind { name: "tf2_msgs/msg/TFMessage", of_frames: true, parts: TRANSFORM },
-    Kind {
+    MessageKind { name: "geometry_msgs/msg/TransformStamped", of_frames: false, parts: TRANSFORM },
+    MessageKind { name: "tf2_msgs/msg/TFMessage", of_frames: true, parts: TRANSFORM },
+    MessageKind {
         name: "sensor_msgs/msg/Temperature",
         of_frames: false,
         parts: &[Stamp, Text("frame_id"), Number("temperature"), Number("variance")],
     },
-    Kind { name: "std_msgs/msg/Float64", of_frames: false, parts: &[Number("data")] },
-    Kind { name: "std_msgs/msg/Float64MultiArray", of_frames: false, parts: &[Dimensions, List("data")] },
+    MessageKind { name: "std_msgs/msg/Float64", of_frames: false, parts: &[Number("data")] },
+    MessageKind { name: "std_msgs/msg/Float64MultiArray", of_frames: false, parts: &[Dimensions, List("data")] },
 ];
 
 /// Elements of a list, at most.
@@ -94,22 +94,22 @@ struct Cdr<'a> {
 }
 
 /// Why a message cannot be read.
-pub(super) type Fault = String;
+pub(super) type FieldFault = String;
 
 impl<'a> Cdr<'a> {
-    fn open(message: &'a [u8]) -> Result<Self, Fault> {
+    fn open(message: &'a [u8]) -> Result<Self, FieldFault> {
         match message {
             [0, order @ (0 | 1), _, _, data @ ..] => Ok(Self { data, at: 0, is_big: *order == 0 }),
             [a, b, ..] => Err(format!("the message is in another form than plain CDR ({a:02x} {b:02x})")),
             _ => Err("the message is empty".into()),
         }
     }
-    fn take(&mut self, bytes: usize, what: &str) -> Result<&'a [u8], Fault> {
+    fn take(&mut self, bytes: usize, what: &str) -> Result<&'a [u8], FieldFault> {
         let taken = self.at.checked_add(bytes).and_then(|end| self.data.get(self.at..end));
         self.at += bytes;
         taken.ok_or_else(|| format!("the message ends within `{what}`"))
     }
-    fn fixed<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Fault> {
+    fn fixed<const N: usize>(&mut self, what: &str) -> Result<[u8; N], FieldFault> {
         self.at = self.at.next_multiple_of(N);
         let mut bytes = [0; N];
         bytes.copy_from_slice(self.take(N, what)?);
@@ -118,18 +118,18 @@ impl<'a> Cdr<'a> {
         }
         Ok(bytes)
     }
-    fn count(&mut self, what: &str) -> Result<usize, Fault> {
+    fn count(&mut self, what: &str) -> Result<usize, FieldFault> {
         self.fixed(what).map(|bytes| u32::from_le_bytes(bytes) as usize)
     }
-    fn number(&mut self, what: &str) -> Result<f64, Fault> {
+    fn number(&mut self, what: &str) -> Result<f64, FieldFault> {
         self.fixed(what).map(f64::from_le_bytes)
     }
-    fn text(&mut self, what: &str) -> Result<&'a [u8], Fault> {
+    fn text(&mut self, what: &str) -> Result<&'a [u8], FieldFault> {
         let length = self.count(what)?;
         let text = self.take(length, what)?;
         Ok(text.strip_suffix(&[0]).unwrap_or(text))
     }
-    fn list(&mut self, what: &str) -> Result<usize, Fault> {
+    fn list(&mut self, what: &str) -> Result<usize, FieldFault> {
         let count = self.count(what)?;
         // No element is shorter than a byte.
         match count <= LONGEST.min(self.data.len()) {
@@ -141,7 +141,7 @@ impl<'a> Cdr<'a> {
 
 /// What stands in a column of a row.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) enum Cell {
+pub(super) enum FieldValue {
     /// The message has no such name.
     #[default]
     Absent,
@@ -155,9 +155,9 @@ pub(super) enum Cell {
 
 /// The columns that messages have, and the cells of the present one.
 #[derive(Default)]
-pub(super) struct Cells {
+pub(super) struct MessageCells {
     pub names: Vec<String>,
-    pub cells: Vec<Cell>,
+    pub cells: Vec<FieldValue>,
     /// New names make no columns any more.
     pub is_closed: bool,
     places: HashMap<String, usize>,
@@ -166,15 +166,15 @@ pub(super) struct Cells {
     columns: Vec<Vec<Option<usize>>>,
 }
 
-impl Cells {
+impl MessageCells {
     /// Sets a cell.
-    pub(super) fn set(&mut self, name: &str, cell: Cell) {
+    pub(super) fn set(&mut self, name: &str, cell: FieldValue) {
         if let Some(place) = self.place(name) {
             self.cells[place] = cell;
         }
     }
     pub(super) fn clear(&mut self) {
-        self.cells.fill(Cell::Absent);
+        self.cells.fill(FieldValue::Absent);
     }
     /// Names of joints of the last message.
     pub(super) fn joints(&self) -> String {
@@ -191,11 +191,11 @@ impl Cells {
         }
         self.places.insert(name.into(), self.names.len());
         self.names.push(name.into());
-        self.cells.push(Cell::Absent);
+        self.cells.push(FieldValue::Absent);
         Some(self.names.len() - 1)
     }
     /// Takes the names of joints, unless they are those of the message before.
-    fn take_joints(&mut self, names: &[&[u8]]) -> Result<(), Fault> {
+    fn take_joints(&mut self, names: &[&[u8]]) -> Result<(), FieldFault> {
         let mut own = Vec::with_capacity(self.joints.len());
         for name in names {
             own.resize(own.len().next_multiple_of(4), 0);
@@ -221,28 +221,28 @@ impl Cells {
     }
 }
 
-fn seconds(cdr: &mut Cdr) -> Result<i64, Fault> {
+fn seconds(cdr: &mut Cdr) -> Result<i64, FieldFault> {
     let whole = i32::from_le_bytes(cdr.fixed("stamp")?);
     Ok(i64::from(whole) * 1_000_000_000 + i64::from(u32::from_le_bytes(cdr.fixed("stamp")?)))
 }
 
 /// Reads the parts of a message into the cells.
-fn parts(kind: &Kind, cdr: &mut Cdr, cells: &mut Cells) -> Result<(), Fault> {
+fn parts(kind: &MessageKind, cdr: &mut Cdr, cells: &mut MessageCells) -> Result<(), FieldFault> {
     let (mut joints, mut list) = (0, 0);
     for part in kind.parts {
         match part {
             Stamp => {
                 let stamp = seconds(cdr)?;
                 // A publisher that does not know the time leaves it at 0.
-                cells.set("stamp", if stamp == 0 { Cell::Blank } else { Cell::Time(stamp) });
+                cells.set("stamp", if stamp == 0 { FieldValue::Blank } else { FieldValue::Time(stamp) });
             }
             Text(name) => {
                 let text = cdr.text(name)?;
-                cells.set(name, Cell::Text(String::from_utf8_lossy(text).into_owned()));
+                cells.set(name, FieldValue::Text(String::from_utf8_lossy(text).into_owned()));
             }
             Number(name) => {
                 let number = cdr.number(name)?;
-                cells.set(name, Cell::Number(number));
+                cells.set(name, FieldValue::Number(number));
             }
             Names => {
                 joints = cdr.list("name")?;
@@ -255,7 +255,7 @@ fn parts(kind: &Kind, cdr: &mut Cdr, cells: &mut Cells) -> Result<(), Fault> {
                     return Err(format!("`{name}` has {count} numbers for {joints} names"));
                 }
                 for joint in 0..joints {
-                    let cell = if count == 0 { Cell::Blank } else { Cell::Number(cdr.number(name)?) };
+                    let cell = if count == 0 { FieldValue::Blank } else { FieldValue::Number(cdr.number(name)?) };
                     if let Some(place) = cells.columns[joint][list] {
                         cells.cells[place] = cell;
                     }
@@ -273,7 +273,7 @@ fn parts(kind: &Kind, cdr: &mut Cdr, cells: &mut Cells) -> Result<(), Fault> {
             List(name) => {
                 for index in 1..=cdr.list(name)? {
                     let number = cdr.number(name)?;
-                    cells.set(&format!("{name}[{index}]"), Cell::Number(number));
+                    cells.set(&format!("{name}[{index}]"), FieldValue::Number(number));
                 }
             }
         }
@@ -282,7 +282,12 @@ fn parts(kind: &Kind, cdr: &mut Cdr, cells: &mut Cells) -> Result<(), Fault> {
 }
 
 /// Reads a message; of one of frames the transform between these. Whether there is one; fails where it cannot be read.
-pub(super) fn read(kind: &Kind, frames: Option<&str>, message: &[u8], cells: &mut Cells) -> Result<bool, Fault> {
+pub(super) fn read(
+    kind: &MessageKind,
+    frames: Option<&str>,
+    message: &[u8],
+    cells: &mut MessageCells,
+) -> Result<bool, FieldFault> {
     cells.clear();
     let mut cdr = Cdr::open(message)?;
     let Some(wanted) = frames else { return parts(kind, &mut cdr, cells).map(|()| true) };
@@ -297,7 +302,7 @@ pub(super) fn read(kind: &Kind, frames: Option<&str>, message: &[u8], cells: &mu
 }
 
 /// The frames of a transform, as a topic names them; what follows is the next transform.
-fn frames_of(cdr: &mut Cdr) -> Result<String, Fault> {
+fn frames_of(cdr: &mut Cdr) -> Result<String, FieldFault> {
     seconds(cdr)?;
     let [parent, child] = [cdr.text("frame_id")?, cdr.text("child_frame_id")?].map(String::from_utf8_lossy);
     (0..7).try_for_each(|_| cdr.number("transform").map(drop))?;

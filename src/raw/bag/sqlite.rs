@@ -3,21 +3,21 @@
 //! table would know of, and it refuses a file that was cut, of which all pages that are there are read here.
 
 use super::{Container, Message, Topic};
-use crate::raw::Source;
+use crate::raw::InputSource;
 use std::collections::BTreeMap;
 use std::io::SeekFrom;
 use std::sync::Arc;
 
 /// How a file begins.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
-/// Pages from the root of a table to a row, at most.
+/// DatabasePages from the root of a table to a row, at most.
 const DEEPEST: usize = 24;
 /// Bytes of a row, at most.
 const LONGEST: u64 = 1 << 30;
 
 /// The pages of a file.
-struct Pages {
-    source: Box<dyn Source>,
+struct DatabasePages {
+    source: Box<dyn InputSource>,
     start: u64,
     size: u64,
     /// Bytes of a page that hold content.
@@ -25,14 +25,14 @@ struct Pages {
     /// Whole pages that are there, and those that the file says it has.
     there: u64,
     stated: u64,
-    /// Pages that a table has and the file has not.
+    /// DatabasePages that a table has and the file has not.
     missing: u64,
     /// Written with a write-ahead log.
     logged: bool,
 }
 
 /// A row, as far as it stands in its page.
-struct Cell {
+struct PageCell {
     id: i64,
     local: Vec<u8>,
     length: usize,
@@ -66,8 +66,8 @@ fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
     None
 }
 
-impl Pages {
-    fn open(mut source: Box<dyn Source>, [start, end]: [u64; 2]) -> Result<Self, (Box<dyn Source>, String)> {
+impl DatabasePages {
+    fn open(mut source: Box<dyn InputSource>, [start, end]: [u64; 2]) -> Result<Self, (Box<dyn InputSource>, String)> {
         let mut head = [0; 100];
         let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut head));
         let size = match big(&head[16..18]) {
@@ -102,7 +102,7 @@ impl Pages {
     }
 
     /// All bytes of a row; none where a page of it is missing.
-    fn whole(&mut self, cell: &Cell) -> Result<Option<Vec<u8>>, String> {
+    fn whole(&mut self, cell: &PageCell) -> Result<Option<Vec<u8>>, String> {
         let (mut bytes, mut next) = (cell.local.clone(), cell.overflow);
         while bytes.len() < cell.length {
             let Some(page) = self.page(u64::from(next))? else { return Ok(None) };
@@ -116,11 +116,11 @@ impl Pages {
 
 /// The rows of a table in the order of their numbers.
 struct TableRows {
-    /// Pages from the root down: content, where the tree's header begins, the next cell.
+    /// DatabasePages from the root down: content, where the tree's header begins, the next cell.
     path: Vec<(Vec<u8>, usize, usize)>,
     /// The page to go down to.
     down: Option<u64>,
-    /// Pages that were visited: no page stands twice in a tree.
+    /// DatabasePages that were visited: no page stands twice in a tree.
     visited: u64,
 }
 
@@ -129,7 +129,7 @@ impl TableRows {
         Self { path: Vec::new(), down: Some(root), visited: 0 }
     }
 
-    fn next(&mut self, pages: &mut Pages) -> Result<Option<Cell>, String> {
+    fn next(&mut self, pages: &mut DatabasePages) -> Result<Option<PageCell>, String> {
         loop {
             if let Some(number) = self.down.take() {
                 self.visited += 1;
@@ -169,19 +169,19 @@ impl TableRows {
 }
 
 /// The row that begins with these bytes of a page.
-fn cell_of(bytes: &[u8], usable: usize) -> Option<Cell> {
+fn cell_of(bytes: &[u8], usable: usize) -> Option<PageCell> {
     let (length, a) = varint(bytes)?;
     let (id, b) = varint(bytes.get(a..)?)?;
     let bytes = &bytes[a + b..];
     let length = usize::try_from(length).ok().filter(|length| *length as u64 <= LONGEST)?;
     if length <= usable - 35 {
-        return Some(Cell { id: id as i64, local: bytes.get(..length)?.to_vec(), length, overflow: 0 });
+        return Some(PageCell { id: id as i64, local: bytes.get(..length)?.to_vec(), length, overflow: 0 });
     }
     let least = (usable - 12) * 32 / 255 - 23;
     let fits = least + (length - least) % (usable - 4);
     let local = if fits <= usable - 35 { fits } else { least };
     let overflow = big(bytes.get(local..local + 4)?) as u32;
-    Some(Cell { id: id as i64, local: bytes[..local].to_vec(), length, overflow })
+    Some(PageCell { id: id as i64, local: bytes[..local].to_vec(), length, overflow })
 }
 
 /// A column of a row, counted from 0; none where its bytes are not there.
@@ -232,7 +232,7 @@ fn columns(statement: &str) -> Vec<String> {
 type BagTables = (BTreeMap<i64, Arc<Topic>>, TableRows, [usize; 3]);
 
 pub(super) struct SqliteMessages {
-    pages: Pages,
+    pages: DatabasePages,
     topics: BTreeMap<i64, Arc<Topic>>,
     messages: TableRows,
     /// Places of topic, time and content among the columns.
@@ -243,15 +243,15 @@ pub(super) struct SqliteMessages {
 
 impl SqliteMessages {
     /// The file between two places of the source.
-    pub(super) fn open(source: Box<dyn Source>, bounds: [u64; 2]) -> Result<Self, (Box<dyn Source>, String)> {
-        let mut pages = Pages::open(source, bounds)?;
+    pub(super) fn open(source: Box<dyn InputSource>, bounds: [u64; 2]) -> Result<Self, (Box<dyn InputSource>, String)> {
+        let mut pages = DatabasePages::open(source, bounds)?;
         match Self::tables(&mut pages) {
             Ok((topics, messages, places)) => Ok(Self { pages, topics, messages, places, cut: 0 }),
             Err(message) => Err((pages.source, message)),
         }
     }
 
-    fn tables(pages: &mut Pages) -> Result<BagTables, String> {
+    fn tables(pages: &mut DatabasePages) -> Result<BagTables, String> {
         let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
         let mut rows = TableRows::new(1);
         while let Some(cell) = rows.next(pages)? {
@@ -313,7 +313,7 @@ impl Container for SqliteMessages {
     fn position(&self) -> u64 {
         self.pages.start + (self.messages.visited * self.pages.size).min(self.pages.there * self.pages.size)
     }
-    fn into_source(self: Box<Self>) -> Box<dyn Source> {
+    fn into_source(self: Box<Self>) -> Box<dyn InputSource> {
         self.pages.source
     }
 }

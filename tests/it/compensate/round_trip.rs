@@ -58,7 +58,9 @@ impl Trip {
             ..CorrectionOptions::counted_by(maker.convention())
         };
         let mut corrector = Corrector::new(&self.arm, None, None, manner);
-        let rules = ProgramRules { partial: Partial::Refused, frames: Frames::Refused, load: ProgramLoad::Optional, tool };
+        // What the letters of a configuration mean stands in no listing.
+        let frames = if language == Language::Fanuc { Frames::Assumed } else { Frames::Refused };
+        let rules = ProgramRules { partial: Partial::Refused, frames, load: ProgramLoad::Optional, tool };
         let source = ProgramFile { place: "program", text: text.as_bytes(), language, companions };
         corrected(&source, rules, self.robot.description(), &mut corrector).map_err(|error| error.to_string())
     }

@@ -50,6 +50,7 @@ fn joints_and_poses_of_the_first_group_are_targets() {
             "11:1: left as it is: moves to a position register, which is not in the listing",
             "18:8: external axis at 500: calib assumed that external axes do not move the robot",
             "19:4: group 2 stays as it is: calib assumed that it does not move the robot",
+            "25:28: CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller",
         ]
     );
     let program = Program::parse(LISTING.as_bytes(), Language::Fanuc, Partial::Refused).expect("accepted");
@@ -104,9 +105,17 @@ fn frames_and_displacements_that_a_listing_does_not_hold_are_said() {
         let program = Program::parse(text.as_bytes(), Language::Fanuc, Partial::Refused).expect("accepted");
         super::told(program.frames())
     };
-    assert!(frames(LISTING).is_empty());
+    let posture =
+        "CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller";
+    let behind = |text: &str| {
+        let mut all = frames(text);
+        let at = all.iter().position(|note| note.ends_with(posture)).expect("what the letters of CONFIG mean is assumed");
+        all.remove(at);
+        all
+    };
+    assert!(behind(LISTING).is_empty());
     let other = LISTING.replace("UF : 0, UT : 2,\t\tCONFIG", "UF : 3, UT : 2,\t\tCONFIG");
-    assert_eq!(frames(&other), ["25:2: user frame 3 is in no listing: calib assumed that it is the robot's world, as UF 0"]);
+    assert_eq!(behind(&other), ["25:2: user frame 3 is in no listing: calib assumed that it is the robot's world, as UF 0"]);
     let other = LISTING.replace("CNT100    ;", "CNT100 Offset,PR[4]    ;");
-    assert_eq!(frames(&other), ["10:1: OFFSET displaces the target: calib assumed that it is reached where it stands"]);
+    assert_eq!(behind(&other), ["10:1: OFFSET displaces the target: calib assumed that it is reached where it stands"]);
 }
