@@ -41,7 +41,7 @@ fn execute(arguments: &CheckExportArguments, command_line: &[OsString]) -> Resul
     // Nothing is written here: a format that holds the arm badly may have been insisted on.
     let export = Export::of(identified, true);
     let serial = |serial: &Option<String>| serial.clone().unwrap_or_else(|| "not stated".into());
-    let (said, code) = match export.check(&label, &text)? {
+    let (statement, code) = match export.check(&label, &text)? {
         Belonging::Same(mark) => (
             format!("is the export of {origin}: {}, model {}, robot serial {}", mark.format, mark.model, serial(&mark.serial)),
             0,
@@ -58,6 +58,6 @@ fn execute(arguments: &CheckExportArguments, command_line: &[OsString]) -> Resul
         }
         Belonging::Other(file, own) => (format!("is of the model {}; that of {origin} is {}", file.model, own.model), 1),
     };
-    emit(&format!("{label}: {said}\n"))?;
+    emit(&format!("{label}: {statement}\n"))?;
     Ok(code)
 }

@@ -27,12 +27,12 @@ use std::path::{Path, PathBuf};
 /// known of each target is appended. A target that is not reached gets no joints: their cells are empty (null in Parquet), `remark` says why,
 /// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
-/// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS), FANUC (.ls), Universal Robots (.script) and ABB
-/// RAPID (.mod: jointtarget, robtarget). A Cartesian target is reached in the posture that it states, in the controller's counting: S and T of
+/// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS), ABB RAPID
+/// (.mod: jointtarget, robtarget), FANUC (.ls: positions of /POS) and Universal Robots (.script: poses and joints of motions). A Cartesian target is reached in the posture that it states, in the controller's counting: S and T of
 /// KRL, confdata of RAPID with cfx; of what that leaves open, and where nothing is stated, the posture nearest to the target before (or
 /// --start) is taken. One that cannot be reached in its posture is refused; where a correction takes a joint over a border, S, T and confdata
 /// are written anew. It stands in the work object or $BASE that is in force on every way to it, and is reached with the tool in force: lines
-/// are followed through branches, loops and calls, by what the file declares, the file of the same name beside it (.src, .dat), $config.dat
+/// are followed through branches, loops and calls, by the declarations of the file, of the file of the same name next to it (.src, .dat), of $config.dat
 /// and the files of --with. The tool is taken as the robot file's where the program has one, and --tool says which it is where it has several.
 /// What is not known so, is computed when the program runs, or moves (conveyors, tools that stand still) is refused (--assume-frames), and so
 /// are programs and tables without a payload where the model depends on load: of RAPID it is the mass of the motion's tool (tooldata, or

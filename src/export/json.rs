@@ -5,12 +5,8 @@ use crate::description::JointKind;
 use crate::error::{Error, Result};
 use serde_json::json;
 
-pub(super) const JSON: Format = Format {
-    name: "json",
-    help: "Everything: description, parameters with sigma, what is left out",
-    carries: CarriedTorques::All,
-    text,
-};
+pub(super) const JSON: Format =
+    Format { name: "json", help: "Everything: description, parameters with sigma, remarks", carries: CarriedTorques::All, text };
 
 fn text(export: &Export) -> Result<String> {
     let finite = |value: f64| if value.is_finite() { json!(value) } else { json!(null) };

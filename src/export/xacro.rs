@@ -73,7 +73,7 @@ fn text(export: &Export) -> Result<String> {
 struct Origins {
     /// Name of each moving joint, place and turn.
     joints: Vec<(String, [[f64; 3]; 2])>,
-    /// What is to be said of the tool.
+    /// The remark on the tool.
     tool: String,
 }
 

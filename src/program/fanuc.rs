@@ -58,7 +58,7 @@ fn section(bytes: &[u8], name: &str) -> Option<usize> {
 /// Reads the section of positions; false where there is none.
 fn positions(bytes: &[u8], found: &mut Gathered, names: &mut Vec<String>) -> bool {
     let (Some(start), Some(end)) = (section(bytes, "/POS"), section(bytes, "/END")) else {
-        found.fault(0, "no listing of a TP program: expected the sections /MN, /POS and /END, each on a line of its own");
+        found.fault(0, "no listing of a TP program: expected the sections /MN, /POS and /END, each on a separate line");
         return false;
     };
     let end = bytes[..end].windows(4).rposition(|four| four.eq_ignore_ascii_case(b"/END")).unwrap_or(end);
@@ -102,7 +102,7 @@ struct Group {
 }
 
 impl Reader<'_, '_> {
-    /// Says what is wrong here; the rest is not read.
+    /// Reports a fault here; the rest is not read.
     fn fault<T>(&mut self, expected: &str) -> Option<T> {
         let token = self.tokens.get(self.at).or(self.tokens.last());
         let (at, text) =
@@ -338,7 +338,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// What is taken for granted of the letters of a configuration.
+/// The assumption on the letters of a configuration.
 const POSTURES: &str =
     "CONFIG: calib assumed that N is a wrist with J5 below zero, and F one above; confirm it at one pose of the controller";
 

@@ -4,7 +4,7 @@
 //! language's grammar is seen whole:
 //! KRL: digits [`.` digits] [`E` [sign] digits] (KUKA System Software, Operating and Programming Instructions for System Integrators);
 //! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
-//! binary integers are no coordinates), as FANUC's listings and URScript. Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
+//! binary integers are no coordinates), as FANUC's listings and URScript. Blanks may stand nowhere in a number, but between it and its sign, which is an operator.
 
 use super::{Gathered, Language};
 use std::ops::Range;

@@ -376,18 +376,18 @@ impl<'p> Reader<'p> {
                 Some((pose.clone(), own.next().filter(|_| own.next().is_none())?.1.values.clone()))
             })
             .collect();
-        let mut told = BTreeSet::new();
+        let mut reported = BTreeSet::new();
         for (name, six) in std::mem::take(&mut self.held) {
             let (is_target, handed) = (self.uses.moved_to.contains(&name), self.uses.handed_on.get(&name));
             match (is_target, handed) {
-                (true, Some((at, how))) if told.insert(name.clone()) => {
+                (true, Some((at, how))) if reported.insert(name.clone()) => {
                     self.found.fault(*at, format!("the target `{name}` {how}: calib cannot say what becomes of it there"));
                 }
                 (true, None) => {
                     let posture = near.get(&name).filter(|_| six.is_pose).map_or(PostureStatement::Unstated, |q| near_to(q));
                     self.found.literals.push(six.literal(posture));
                 }
-                (false, Some((at, how))) if six.is_pose && told.insert(name.clone()) => {
+                (false, Some((at, how))) if six.is_pose && reported.insert(name.clone()) => {
                     self.found.fault(*at, format!("the pose `{name}` {how}: calib cannot say whether it is a target"));
                 }
                 _ => {}

@@ -181,7 +181,7 @@ impl BagRows {
             let Some(found) = kind.or(found) else { break };
             kind = Some(found);
             bytes += message.data.len();
-            // What cannot be read is told of its row.
+            // A message that cannot be read is rejected with its row.
             if message::read(found, frames, &message.data, &mut cells).unwrap_or(true) && cells.names.len() <= WIDEST {
                 head.push_back(message.clone());
             }

@@ -1,4 +1,4 @@
-//! The picture of the table of causes: what was found and what is left, by place and by what it follows.
+//! The picture of the table of causes: findings and residual, by place and kind of variable.
 
 use super::number::significant;
 use super::page::{render, sentence_case};

@@ -17,7 +17,7 @@ pub(super) fn render(name: &str, template: &str, page: &impl Serialize) -> Resul
         .map_err(|error| Error::Bug(format!("template {name}: {error:#}")))
 }
 
-/// A statement as a sentence of its own.
+/// A statement as a sentence.
 pub(super) fn sentence_case(statement: &str) -> String {
     let mut letters = statement.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();

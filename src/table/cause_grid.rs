@@ -1,4 +1,4 @@
-//! The table of causes as a person looks at it: places down the chain, kinds of variable across; what was found, and what is left.
+//! The table of causes as a person looks at it: places down the chain, kinds of variable across; findings and residual.
 
 use super::{Cells, Findings};
 use crate::effect::{Place, names};
@@ -24,9 +24,9 @@ const COLUMNS: [&str; 12] = [
 /// A row for every place, and two cells, before and after, for every column.
 #[derive(Debug, Serialize)]
 pub struct CauseGrid {
-    /// Kinds of variable of which something was found or is left; all that were asked where nothing is.
+    /// Kinds of variable with a finding or a residual; all that were compared where there is none.
     pub columns: Vec<&'static str>,
-    /// Kinds of variable that were asked besides.
+    /// Kinds of variable that were compared, with nothing in any cell.
     pub others: Vec<&'static str>,
     /// Down the chain, from the base to the instrument.
     pub rows: Vec<CauseGridRow>,
@@ -37,9 +37,9 @@ pub struct CauseGrid {
 pub struct CauseGridRow {
     /// E.g. `joint 3`.
     pub place: String,
-    /// What was found; null where nothing was asked.
+    /// Findings; null where no cell was compared.
     pub found: Vec<Option<CauseGridCell>>,
-    /// What the likeliest further cause would explain.
+    /// Rms that the likeliest further cause would explain.
     pub left: Vec<Option<CauseGridCell>>,
 }
 
@@ -108,7 +108,7 @@ impl CauseGrid {
 }
 
 impl CauseGrid {
-    /// What was found, in columns of text; empty where that is nothing.
+    /// The findings in columns of text; empty without any.
     pub fn text(&self) -> String {
         let size = |cell: &Option<CauseGridCell>| match cell.as_ref().and_then(|cell| cell.mm) {
             Some(mm) if mm >= 1.0 => format!("{mm:.2} mm"),

@@ -92,8 +92,8 @@ fn transforms_are_read_by_their_frames() {
         let x = names.iter().position(|name| name == "translation.x").unwrap();
         let read: Vec<&str> = found.iter().map(|row| row[x].as_str()).collect();
         assert_eq!(read, ["1.0", "2.0", "4.0", "5.0", "7.0", "8.0"]);
-        let said = rows_of(Box::new(Cursor::new(bag)), None).unwrap_err().to_string();
-        assert!(said.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"), "{said}");
+        let answer = rows_of(Box::new(Cursor::new(bag)), None).unwrap_err().to_string();
+        assert!(answer.contains("`topic: NAME`; allowed: `/tf base->tool0`, `/tf map->base`"), "{answer}");
     }
 }
 
@@ -103,16 +103,19 @@ fn a_topic_that_is_not_there_or_not_read_is_named_with_those_that_are() {
     messages.push(("/plan", "trajectory_msgs/msg/JointTrajectory", START, vec![0, 1, 0, 0]));
     for bag in every(&messages) {
         let refused = |topic: &str| rows_of(Box::new(Cursor::new(bag.clone())), Some(topic)).unwrap_err().to_string();
-        let said = refused("/joint_state");
+        let answer = refused("/joint_state");
         assert!(
-            said.contains("no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`"),
-            "{said}"
+            answer.contains("no messages of a topic `/joint_state`; allowed: `/joint_states`; of other types: `/plan`"),
+            "{answer}"
         );
-        let said = refused("/plan");
-        assert!(said.contains("holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"), "{said}");
+        let answer = refused("/plan");
+        assert!(
+            answer.contains("holds trajectory_msgs/msg/JointTrajectory, which is not read; allowed: sensor_msgs"),
+            "{answer}"
+        );
     }
-    let said = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None).unwrap_err().to_string();
-    assert!(said.contains("has no topic that is read; none of its topics is read"), "{said}");
+    let answer = rows_of(Box::new(Cursor::new(db3(&messages[3..]))), None).unwrap_err().to_string();
+    assert!(answer.contains("has no topic that is read; none of its topics is read"), "{answer}");
 }
 
 #[test]
@@ -155,6 +158,23 @@ fn damaged_bytes_never_break_the_reading() {
     }
 }
 
+/// The type of a message's topic in the head of its row: a number that SQLite keeps for later.
+#[test]
+fn a_message_that_cannot_be_read_is_a_loss_of_its_bag() {
+    let bag = db3(&states(false, 40));
+    // Its length, then the types of number, topic, time. Pages that were split hold old copies of rows, too.
+    let head = [0x06, 0x00, 0x09, 0x06];
+    let found = (0..bag.len() - 4).filter(|at| bag[*at..at + 4] == head).filter_map(|at| {
+        let mut damaged = bag.clone();
+        damaged[at + 2] = 0x0a;
+        let (_, rows, loss) = rows(&damaged, Some("/joint_states"));
+        (rows.len() < 40).then_some((rows.len(), loss))
+    });
+    let found: Vec<_> = found.collect();
+    let lost = || Some("it is damaged: 1 of its messages cannot be read, which are lost".to_string());
+    assert_eq!(found, vec![(39, lost()); 40], "each of the rows");
+}
+
 #[test]
 fn a_folder_of_parts_is_one_recording_in_the_order_of_their_numbers() {
     let all = states(false, 120);
@@ -184,11 +204,11 @@ fn run(here: &Path, pipeline: &str) -> (Recording, Rejected, Intake, String) {
         "calib: 1\nname: p\nseed: 1\nstages:\n  - uses: robot\n    with: {file: robot.yaml}\n  - uses: ingest\n    with:\n";
     std::fs::write(here.join("p.yaml"), format!("{head}{pipeline}")).unwrap();
     let output = calib(here, &["run", "p.yaml", "--store", "s"], "");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let answer = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{answer}");
     let at = |name: &str| here.join("s/tables/p").join(format!("ingest.{name}.parquet"));
     let recording = from_file(&at("recording")).unwrap().table;
-    (recording, from_file(&at("rejected")).unwrap().table, from_file(&at("intake")).unwrap().table, said)
+    (recording, from_file(&at("rejected")).unwrap().table, from_file(&at("intake")).unwrap().table, answer)
 }
 
 const POSES: &str = "      files:
@@ -273,17 +293,17 @@ fn a_folder_of_parts_is_run_as_one_file_and_a_part_that_changed_is_read_again() 
     let pipeline = POSES.replace("run.mcap", "run");
     let (recording, _, intake, _) = run(folder.path(), &pipeline);
     assert_eq!((recording.rows(), intake.0[0].read), (40, 40));
-    let (.., said) = run(folder.path(), &pipeline);
-    assert!(said.contains("ingest  cached"), "{said}");
+    let (.., answer) = run(folder.path(), &pipeline);
+    assert!(answer.contains("ingest  cached"), "{answer}");
     let last = parts.join("run_9.mcap");
     std::fs::write(&last, &std::fs::read(&last).unwrap()[..300]).unwrap();
-    let (recording, .., said) = run(folder.path(), &pipeline);
-    assert!(recording.rows() < 40 && said.contains("part 10: it is cut or damaged before byte"), "{said}");
+    let (recording, .., answer) = run(folder.path(), &pipeline);
+    assert!(recording.rows() < 40 && answer.contains("part 10: it is cut or damaged before byte"), "{answer}");
     // Two kinds of parts are no recording, nor is a folder of anything else.
     std::fs::write(parts.join("run_3.db3"), db3(&messages[..8])).unwrap();
     let output = calib(folder.path(), &["check", "p.yaml"], "");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && said.contains("all .mcap or all .db3"), "{said}");
+    let answer = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && answer.contains("all .mcap or all .db3"), "{answer}");
 }
 
 #[test]
@@ -320,12 +340,12 @@ fn init_reads_a_bag_and_its_pipeline_runs() {
         std::fs::create_dir(&here).unwrap();
         std::fs::write(here.join(name), bag).unwrap();
         let output = calib(&here, &["init", "--robot", "ur10", "--data", name], "");
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{said}");
-        assert!(said.contains("topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"), "{said}");
+        let answer = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{answer}");
+        assert!(answer.contains("topic `/image`: sensor_msgs/msg/Image, 1 message; this type is not read"), "{answer}");
         assert!(
-            said.contains("topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s"),
-            "{said}"
+            answer.contains("topic `/reflector`: geometry_msgs/msg/PointStamped, 60 messages, 2.0000 Hz, longest gap 0.5000 s"),
+            "{answer}"
         );
         let pipeline = std::fs::read_to_string(here.join("pipeline.yaml")).unwrap();
         for line in [

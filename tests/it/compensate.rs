@@ -81,7 +81,7 @@ joints:
   - {name: A6, limits: [-170, 170]}
 ";
 
-const PIPELINE: &str = "calib: 1
+pub const PIPELINE: &str = "calib: 1
 name: small
 seed: 3
 stages:

@@ -1,6 +1,6 @@
 //! Exports: what is written is read back by calib itself and is the same arm; programs change in the numbers of targets alone.
 
-use crate::compensate::{calib, cell};
+use crate::compensate::{PIPELINE, calib, cell};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use serde_json::Value;
@@ -113,22 +113,7 @@ fn of_the_library(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let robot = calib::robot::LibraryArm::find(name).expect("an arm").text.replace("point: [0, 0, 0]", "point: [40, 30, 120]");
     std::fs::write(folder.path().join("robot.yaml"), robot).expect("a file");
-    let pipeline = "calib: 1
-name: arm
-seed: 3
-stages:
-  - uses: robot
-    with: {file: robot.yaml}
-  - uses: simulate
-    with:
-      truth: {offset_deg: [0.02, -0.05, 0.04, 0.03, -0.06, 0.0], links: [{link: 2, shift_mm: [0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]}]}
-      poses: {floor_mm: 100, clearance_mm: 200}
-      blocks: [{usage: fit, points: 60}, {usage: validate, points: 20}]
-  - uses: split
-    with: {by: usage}
-  - uses: identify
-    with: {on: [fit]}
-";
+    let pipeline = PIPELINE.replace("[0.4, 0.2, -0.3]", "[0.4, 0.2, -0.3], tilt_arcsec: [40, 20, 60]");
     std::fs::write(folder.path().join("pipeline.yaml"), pipeline).expect("a file");
     let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,5 +1,5 @@
 //! Torques by the evidence of the table of causes: a cell is a cause at a place in every shape that it may have; what was accepted stands in the
-//! covariance with its amplitude, and every other cell is asked beside it.
+//! covariance with its amplitude, and every other cell is compared given these.
 
 use super::cause::TORQUE_CONSTANT;
 use super::choice::CauseChoice;
@@ -28,9 +28,9 @@ pub(super) struct TorqueComponent {
     pub amplitude: f64,
 }
 
-/// What a cell says beside others.
+/// The posterior of a cell given others.
 #[derive(Debug, Clone, Copy)]
-struct CellWord {
+struct CellPosterior {
     /// ln of its posterior odds.
     log_odds: f64,
     best: TorqueComponent,
@@ -164,7 +164,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         state.known.see((gram, along), &across, 0)
     }
 
-    /// ln of the evidence of a form beside a state, and its amplitude; nothing of one that cannot be.
+    /// ln of the evidence of a form given a state, and its amplitude; none of one that is impossible.
     fn form(&self, number: usize, state: &TorqueState) -> Option<(f64, f64)> {
         let (gram, along) = self.seen(number, state);
         let columns: Vec<usize> = self.choice.problem.all.of(number).collect();
@@ -181,8 +181,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         may_be.then_some((found.log, found.amplitude))
     }
 
-    /// What a cell says beside a state with forms of a set.
-    fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellWord> {
+    /// The posterior of a cell given a state.
+    fn cell(&self, cell: usize, state: &TorqueState) -> Option<CellPosterior> {
         let own = &self.cells[cell];
         let open = self.choice.open;
         let asked = own.forms.iter().filter(|form| **form < open && self.choice.may_join(**form, &state.set));
@@ -192,17 +192,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let best = all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let count = own.forms.iter().filter(|form| **form < open).count().max(1) as f64;
         let log = log_sum(&all.iter().map(|(log, _)| *log).collect::<Vec<_>>()) - count.ln();
-        Some(CellWord { log_odds: own.log_prior + log, best: best.1 })
+        Some(CellPosterior { log_odds: own.log_prior + log, best: best.1 })
     }
 
-    /// The cell of some that says most beside a state.
-    fn strongest(&self, cells: impl IntoIterator<Item = usize>, state: &TorqueState) -> Option<CellWord> {
-        let words = cells.into_iter().filter_map(|cell| self.cell(cell, state));
-        words.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
+    /// The most probable of some cells given a state.
+    fn strongest(&self, cells: impl IntoIterator<Item = usize>, state: &TorqueState) -> Option<CellPosterior> {
+        let all = cells.into_iter().filter_map(|cell| self.cell(cell, state));
+        all.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
     }
 
-    /// ln of the odds of a component beside the others.
-    fn odds_of(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> CellWord {
+    /// ln of the odds of a component given the others.
+    fn odds_of(&self, components: &[TorqueComponent], place: usize, kappa: f64) -> CellPosterior {
         let state = self.state(&without(components, place), Some(kappa));
         let own = components[place];
         let cell = self.cell_of[&own.form];
@@ -212,10 +212,10 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let of_itself = self.form(own.form, &state);
         let log = of_itself.map_or(f64::NEG_INFINITY, |(log, _)| prior + log - count.ln());
         let best = of_itself.map_or(own, |(_, amplitude)| TorqueComponent { amplitude, ..own });
-        CellWord { log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)), best }
+        CellPosterior { log_odds: grid.map_or(log, |grid| grid.log_odds.max(log)), best }
     }
 
-    /// Amplitudes anew, each beside all others.
+    /// Amplitudes anew, each given all others.
     fn backfit(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         for _ in 0..2 {
             let kappa = self.state(&components, None).known.kappa;
@@ -246,7 +246,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         log - 0.5 * (self.rows.freedom + *NU) * (*NU + state.rows.square).ln()
     }
 
-    /// Exchanges components for cells that say more in their place.
+    /// Exchanges components for cells that are more probable in their place.
     fn swap(&self, mut components: Vec<TorqueComponent>) -> Vec<TorqueComponent> {
         'rounds: for _ in 0..*EXCHANGES {
             let kappa = self.state(&components, None).known.kappa;
@@ -261,17 +261,17 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 };
                 let Some(best) = self.strongest((0..self.cells.len()).filter(may), &state) else { continue };
                 let is_same = self.cell_of[&best.best.form] == self.cell_of[&own];
-                let word = if is_same {
+                let gain = if is_same {
                     // Another shape of the same cell: by itself, against the present one.
                     let [one, other] =
-                        [best.best.form, own].map(|form| self.form(form, &state).map_or(f64::NEG_INFINITY, |word| word.0));
+                        [best.best.form, own].map(|form| self.form(form, &state).map_or(f64::NEG_INFINITY, |found| found.0));
                     one - other
                 } else {
                     best.log_odds - stays
                 };
                 let mut next = rest.clone();
                 next.insert(place, best.best);
-                if word <= *SWAPS || !self.choice.is_whole(&forms(&next)) {
+                if gain <= *SWAPS || !self.choice.is_whole(&forms(&next)) {
                     continue;
                 }
                 let next = self.backfit(next);
@@ -351,8 +351,8 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let others = (0..self.cells.len()).filter(|cell| *cell != self.cell_of[&form]);
         let competing = others.filter(|cell| self.choice.compete(self.cells[*cell].forms[0], form));
         let rival = |cell: usize| {
-            let word = self.cell(cell, &state)?;
-            Some(((self.cells[cell].name, self.cells[cell].place), word.log_odds))
+            let posterior = self.cell(cell, &state)?;
+            Some(((self.cells[cell].name, self.cells[cell].place), posterior.log_odds))
         };
         CellOdds { own, rivals: competing.filter_map(rival).collect() }
     }
@@ -373,7 +373,7 @@ pub(super) struct OtherInertials {
 }
 
 impl OtherInertials {
-    /// They share what one of them would have beside a finding of some odds.
+    /// They share the odds that one of them would have as the rival of a finding.
     pub fn rivals(&self, choice: &CauseChoice, own: f64) -> Vec<((&'static str, Place), f64)> {
         let log = own - self.worse - (self.forms.len().max(1) as f64).ln();
         self.forms.iter().map(|form| ((choice.form(*form).cause.name(), choice.form(*form).place), log)).collect()
@@ -409,7 +409,7 @@ pub(super) fn search(choice: &CauseChoice, start: &[usize]) -> Vec<usize> {
     forms(&TorqueTable::new(choice).searched(start))
 }
 
-/// A set brought to rest: exchanges, merges and removals.
+/// A set after exchanges, merges and removals.
 pub(super) fn settle(choice: &CauseChoice, set: &[usize]) -> Vec<usize> {
     let mut table = TorqueTable::new(choice);
     let components = table.components(set);

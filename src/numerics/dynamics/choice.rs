@@ -6,7 +6,7 @@ use super::sweep::SweptColumns;
 use super::weighted::WeightedColumns;
 use crate::effect::Place;
 
-/// The forms of one problem with the base that they are looked at beside.
+/// The forms of one problem, with the base model that is fitted with all of them.
 pub(super) struct CauseChoice<'a> {
     pub problem: &'a TorqueProblem<'a>,
     pub weighted: &'a WeightedColumns,
@@ -25,7 +25,7 @@ impl<'a> CauseChoice<'a> {
         &self.problem.all.forms[number]
     }
 
-    /// Whether a form with some coefficients beside forms of a set is one that its cause can have.
+    /// Whether a form with some coefficients, given the forms of a set, is one that its cause can have.
     pub fn may_be(&self, number: usize, set: &[usize], rises: impl Fn() -> bool, values: impl Fn() -> Vec<f64>) -> bool {
         let form = self.form(number);
         let about = form.cause.about();
@@ -84,8 +84,8 @@ impl<'a> CauseChoice<'a> {
         a.place == b.place || (a.cause.about().inertial && b.cause.about().inertial)
     }
 
-    /// Viscous or Coulomb friction beside the other one where a set has only one of them: hardly a joint is without either, and what is left
-    /// out would be in the number of the other with no word of it in its uncertainty.
+    /// Viscous or Coulomb friction where a set has only the other one: hardly a joint is without either, and the missing one would bias the
+    /// other without being in its uncertainty.
     pub fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let is_in = |name: &str, place: Place| {
             set.iter().any(|number| self.form(*number).cause.name() == name && self.form(*number).place == place)

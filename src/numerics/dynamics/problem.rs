@@ -40,7 +40,7 @@ pub(super) struct TorqueProblem<'a> {
     pub noise: Vec<JointNoise>,
     /// Causes, with their places, of which only a number at an end of its search would explain the torques.
     pub barred: Vec<(&'static str, Place)>,
-    /// Whether the width of a sign has changed since columns of forms beside a set were made.
+    /// Whether the width of a sign has changed since columns of forms outside a set were made.
     is_stale: bool,
     /// Least and greatest, C, where it was recorded.
     pub temperature: Option<[f64; 2]>,

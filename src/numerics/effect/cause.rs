@@ -22,7 +22,7 @@ pub struct Cause {
     pub confounded: &'static str,
     /// Columns of the recording and entries of the robot file without which it cannot be told.
     pub needs: &'static str,
-    /// What a mechanic is told of a finding, without its size at the tool: words with holes such as `{value}`. Its laws may say more.
+    /// The sentence for a finding, without its size at the tool: words with holes such as `{value}`. Its laws may say more.
     pub sentence: &'static str,
     /// Where it acts, and what it follows there.
     pub laws: &'static [LawRow],

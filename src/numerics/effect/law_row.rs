@@ -36,7 +36,7 @@ pub struct LawRow {
     pub sigma: f64,
     /// What distinguishes it from other laws of its cause in one model; empty: the order of a wave, else nothing.
     pub variant: &'static str,
-    /// What a mechanic is told of it: words with holes such as `{value}`.
+    /// The sentence for it: words with holes such as `{value}`.
     pub says: &'static str,
 }
 

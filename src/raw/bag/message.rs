@@ -25,7 +25,7 @@ enum FieldType {
 /// A type of message that is read.
 pub(super) struct MessageKind {
     pub name: &'static str,
-    /// It holds any number of them; which one is read is said by its two frames.
+    /// It holds any number of them; its two frames select the one that is read.
     pub of_frames: bool,
     parts: &'static [FieldType],
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// How a file begins.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
-/// DatabasePages from the root of a table to a row, at most.
+/// Pages from the root of a table to a row, at most.
 const DEEPEST: usize = 24;
 /// Bytes of a row, at most.
 const LONGEST: u64 = 1 << 30;
@@ -25,7 +25,7 @@ struct DatabasePages {
     /// Whole pages that are there, and those that the file says it has.
     there: u64,
     stated: u64,
-    /// DatabasePages that a table has and the file has not.
+    /// Pages that a table has and the file has not.
     missing: u64,
     /// Written with a write-ahead log.
     logged: bool,
@@ -101,8 +101,11 @@ impl DatabasePages {
         Ok(Some(page))
     }
 
-    /// All bytes of a row; none where a page of it is missing.
+    /// All bytes of a row; none where a page of it is missing, or its length is more than the file's.
     fn whole(&mut self, cell: &PageCell) -> Result<Option<Vec<u8>>, String> {
+        if cell.length as u64 > self.there * self.size {
+            return Ok(None);
+        }
         let (mut bytes, mut next) = (cell.local.clone(), cell.overflow);
         while bytes.len() < cell.length {
             let Some(page) = self.page(u64::from(next))? else { return Ok(None) };
@@ -116,11 +119,11 @@ impl DatabasePages {
 
 /// The rows of a table in the order of their numbers.
 struct TableRows {
-    /// DatabasePages from the root down: content, where the tree's header begins, the next cell.
+    /// Pages from the root down: content, where the tree's header begins, the next cell.
     path: Vec<(Vec<u8>, usize, usize)>,
     /// The page to go down to.
     down: Option<u64>,
-    /// DatabasePages that were visited: no page stands twice in a tree.
+    /// Pages that were visited: no page stands twice in a tree.
     visited: u64,
 }
 
@@ -237,7 +240,7 @@ pub(super) struct SqliteMessages {
     messages: TableRows,
     /// Places of topic, time and content among the columns.
     places: [usize; 3],
-    /// Rows of which a page is missing.
+    /// Rows that cannot be read.
     cut: u64,
 }
 
@@ -283,7 +286,10 @@ impl Container for SqliteMessages {
     fn next(&mut self, wanted: &dyn Fn(&str) -> bool, message: &mut Message) -> Result<bool, String> {
         let lost = |why: String| format!("it is damaged ({why}): what was recorded after that is lost");
         while let Some(cell) = self.messages.next(&mut self.pages).map_err(lost)? {
-            let Some(Value::Integer(topic)) = value(&cell.local, self.places[0]) else { continue };
+            let Some(Value::Integer(topic)) = value(&cell.local, self.places[0]) else {
+                self.cut += 1;
+                continue;
+            };
             let Some(topic) = self.topics.get(&topic).filter(|topic| wanted(&topic.name)).cloned() else { continue };
             let row = self.pages.whole(&cell).map_err(lost)?;
             let found = row.as_ref().map(|row| (value(row, self.places[1]), value(row, self.places[2])));
@@ -296,7 +302,8 @@ impl Container for SqliteMessages {
             self.cut += 1;
         }
         match (self.pages.missing, self.pages.stated.saturating_sub(self.pages.there)) {
-            (0, _) => Ok(false),
+            (0, _) if self.cut == 0 => Ok(false),
+            (0, _) => Err(format!("it is damaged: {} of its messages cannot be read, which are lost", self.cut)),
             (missing, pages) => Err(format!(
                 "it is cut: {pages} of {} pages are not there, {missing} of them hold messages, which are lost",
                 self.pages.stated

@@ -284,7 +284,7 @@ impl DiagnosisSummary {
         }
         let grid = CauseGrid::of(&self.cells, &self.findings).text();
         if !grid.is_empty() {
-            text.push_str(&format!("{grid}            (rms at the tool of what was found, by what it follows)\n\n"));
+            text.push_str(&format!("{grid}            (rms at the tool of the findings, by place and kind of variable)\n\n"));
         }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));

@@ -48,7 +48,6 @@ impl FormulaSearch<'_, '_> {
         }
         let causes = &self.state.causes;
         let members: Vec<usize> = (0..causes.len()).filter(|i| own.contains(&&causes[*i].form)).collect();
-
         let (place, variables) = self.variables(&own)?;
         let rest: Vec<&Form> = (0..causes.len()).filter(|i| !members.contains(i)).map(|i| &causes[i].form).collect();
         let (problem, jacobian) = (&self.view.problem, self.view.problem.jacobian(self.fitter.free()));
@@ -60,7 +59,6 @@ impl FormulaSearch<'_, '_> {
             .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &given))
             .collect();
         let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
-
         let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
         let near = alternatives.near()?;
         // Where nothing near the model does without them, all that is known is that it is worse than any formula.

@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_evidence_of_columns_that_are_not_orthogonal_is_that_of_their_covariance() {
-        // UnitColumns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
+        // Columns and a residual of 9 rows; the covariance of the rows as a whole instead of the columns' products.
         let entry = |i: usize, j: usize| (((5 * i + 3 * j * j + 2 * i * j) % 11) as f64 - 5.0) * 300.0;
         let columns = DMatrix::from_fn(9, 5, entry);
         let residual = DVector::from_fn(9, |i, _| ((7 * i) % 5) as f64 - 1.5);

@@ -24,7 +24,7 @@ pub(super) struct NoiseShape {
     currents: Option<f64>,
 }
 
-/// UnitColumns of unit rms motion at the tool.
+/// Columns of unit rms motion at the tool.
 pub(super) struct UnitColumns {
     /// Residual rows x columns.
     pub values: Arc<DMatrix<f64>>,
@@ -129,7 +129,7 @@ impl<'a> SearchRows<'a> {
         self.values.par_extend(fresh.into_par_iter().map(|of| (of, problem.values(of))));
     }
 
-    /// UnitColumns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
+    /// Columns of some forms, one form after another, and how many each has. They end before the rows of motor currents where no form says
     /// anything of these.
     pub fn columns(&self, forms: &[Form]) -> (UnitColumns, Vec<usize>) {
         let each: Vec<Weighed> = forms.iter().map(|form| self.of_term(form).unwrap_or_else(|| self.of_form(form))).collect();

@@ -22,7 +22,7 @@ pub(super) struct SeenGroup {
     pub group: ShapeGroup,
     /// Its columns among those of its block.
     pub range: Range<usize>,
-    /// UnitColumns of each form.
+    /// Columns of each form.
     pub counts: Vec<usize>,
     gram: DMatrix<f64>,
     gradient: DVector<f64>,
@@ -99,7 +99,7 @@ pub(super) struct Component {
     pub square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
     pub amplitude: f64,
-    /// UnitColumns whose products with themselves are its part in the covariance: the directions that the rows could show.
+    /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
     pub part: Arc<DMatrix<f64>>,
     /// What makes these of its columns.
     pub mix: Arc<DMatrix<f64>>,

@@ -38,8 +38,8 @@ pub(super) fn findings(last: &LastRound, at_fitted_rows: bool, something_left: b
 }
 
 /// What was found, with the causes of the model that are a part of each but no numbers of it: what has no name and is small beside a finding
-/// at its place, or next to nothing beside the largest of all, is what the shapes of those leave. So is, as long as more than noise is left,
-/// whatever is weaker at the place of a finding without a name.
+/// at its place, or a trace of the largest of all, is a misfit of their shapes. So is, as long as the residual exceeds the noise, whatever is
+/// weaker at the place of a finding without a name.
 fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Vec<usize>)> {
     let sized = |found: &FoundCell| (size(last, &found.members), found.clone(), Vec::new());
     let mut all: Vec<(f64, FoundCell, Vec<usize>)> = last.answer.found.iter().map(sized).collect();
